@@ -1,0 +1,152 @@
+"""What a pilot sees, what it commands, and the interfaces of the plug-ins between stick and aircraft."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol, runtime_checkable
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One frame's output of any pilot: MOCM, a person, a recording, or a user's own."""
+
+    stick: float
+    """Longitudinal stick, -1 (full aft) to 1 (full forward, nose down); 1 is 4.8 in."""
+    lever: float
+    """Power lever, 0 (low collective) to 1 (high collective)."""
+    nacelle_rate: float
+    """Commanded nacelle rate [rad/s]; negative converts towards airplane mode (0 deg)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What pilots, nacelle laws and protection laws may know of the aircraft. SI and radians."""
+
+    time: float
+    """Time since frame 0 [s]."""
+    airspeed: float
+    """Airspeed along the flight, signed: negative in rearward flight [m/s]."""
+    airspeed_rate: float
+    """Rate of the airspeed [m/s^2]."""
+    nacelle_angle: float
+    """Nacelle angle, pi/2 helicopter, 0 airplane [rad]."""
+    nacelle_rate: float
+    """Rate of the nacelle angle [rad/s]."""
+    pitch: float
+    """Pitch attitude, nose up positive [rad]."""
+    pitch_rate: float
+    """Body pitch rate [rad/s]."""
+    flight_path_angle: float
+    """Angle of the air-relative flight path above the horizon [rad]."""
+    altitude: float
+    """Height above the ground [m]."""
+    climb_rate: float
+    """Vertical speed, up positive [m/s]."""
+    load_factor: float
+    """Normal load factor, 1 in level flight [-]."""
+    mast_torque: float
+    """Torque of one mast [N m]."""
+    flapping: float
+    """Magnitude of the cyclic (gimbal) flapping relative to the mast [rad]."""
+    on_downstop: bool
+    """The nacelles rest on the airplane-mode stop."""
+    nacelle_ok: bool
+    """The conversion actuator follows its commands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What the flight is meant to do now, for a pilot that follows a programme. SI and radians."""
+
+    airspeed: float
+    """Filtered airspeed reference [m/s]."""
+    airspeed_rate: float
+    """Its rate [m/s^2]."""
+    nacelle_angle: float
+    """Unfiltered nacelle angle of the programme [rad]."""
+    nacelle_rate: float
+    """Rate of the programme's nacelle angle over the coming frame [rad/s]."""
+    altitude: float
+    """Altitude to hold [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """Distances to the limits at this frame; positive inside."""
+
+    low: float
+    """Airspeed above the low-speed boundary at this nacelle angle [m/s]."""
+    high: float
+    """Airspeed below the high-speed boundary at this nacelle angle [m/s]."""
+    nacelle_forward: float
+    """Nacelle travel towards airplane mode before a boundary is met, at this airspeed [rad]."""
+    nacelle_aft: float
+    """Nacelle travel towards helicopter mode before a boundary is met, at this airspeed [rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Intervention:
+    """One thing a protection law did in one frame, and why."""
+
+    limit: str
+    """The limit that asked for it, as named in docs/protection.md."""
+    channel: Literal["stick", "lever", "nacelle_rate"]
+    """The channel it acted on."""
+    kind: Literal["warn", "limit", "reverse", "blend", "clip"]
+    """How it acted."""
+    before: float
+    """The pilot's value, in the unit of the channel."""
+    after: float
+    """The limited value, in the unit of the channel."""
+    margin: float
+    """Margin to the limit when it acted, in the limit's unit."""
+    time_to_limit: float
+    """Predicted time until the limit is met [s]; infinite where it is not approached."""
+
+
+@runtime_checkable
+class Pilot(Protocol):
+    """A pilot of the user's own, loaded by ``MODULE:CLASS``; deterministic, sees sensor values only."""
+
+    def step(self, sensors: Sensors, reference: Reference, dt: float) -> Command:
+        """Give this frame's command.
+
+        Args:
+            sensors: The aircraft as the pilot may know it.
+            reference: What the scenario asks for.
+            dt: Length of the frame [s].
+        """
+        ...
+
+
+@runtime_checkable
+class NacelleLaw(Protocol):
+    """Automatic nacelle control: turns sensor values into a nacelle rate."""
+
+    def step(self, sensors: Sensors, command: Command, dt: float) -> float:
+        """Give this frame's nacelle rate [rad/s].
+
+        Args:
+            sensors: The aircraft as the law may know it.
+            command: The pilot's command of this frame.
+            dt: Length of the frame [s].
+        """
+        ...
+
+
+@runtime_checkable
+class ProtectionLaw(Protocol):
+    """Envelope protection: limits the pilot's command and says what it did."""
+
+    def step(
+        self, sensors: Sensors, command: Command, margins: Margins, dt: float
+    ) -> tuple[Command, list[Intervention]]:
+        """Give the limited command and the interventions of this frame.
+
+        Args:
+            sensors: The aircraft as the law may know it.
+            command: The pilot's command of this frame.
+            margins: Distances to the corridor boundaries.
+            dt: Length of the frame [s].
+        """
+        ...

@@ -1,0 +1,68 @@
+"""Errors a user can cause, each with one clear sentence and its exit code (``docs/commands.md``)."""
+
+from __future__ import annotations
+
+EXIT_EXPECTATION_FAILED = 1
+EXIT_BAD_INPUT = 2
+EXIT_OVERRUN = 3
+EXIT_OUTPUT_FAILED = 4
+
+
+class RtsimError(Exception):
+    """Base of every error whose message is meant for the user; the command prints it without traceback."""
+
+    exit_code = EXIT_BAD_INPUT
+
+
+class InputError(RtsimError):
+    """Something the user gave is wrong: the message names file, key, value, allowed range and mend."""
+
+    exit_code = EXIT_BAD_INPUT
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | None = None,
+        key: str | None = None,
+        value: object = None,
+        allowed: str | None = None,
+        mend: str | None = None,
+    ) -> None:
+        """Compose the sentence.
+
+        Args:
+            problem: What is wrong, in a few words without full stop.
+            file: The file it stands in, where there is one.
+            key: The key, option or argument, spelled as the user spells it.
+            value: The offending value (shown with ``repr``); None leaves it out.
+            allowed: The allowed range or choices, in words.
+            mend: What to do about it, as an imperative.
+        """
+        self.problem, self.file, self.key = problem, file, key
+        self.value, self.allowed, self.mend = value, allowed, mend
+        where = ": ".join(part for part in (file, key) if part)
+        text = f"{where}: {problem}" if where else problem
+        if value is not None:
+            text += f" (got {value!r})"
+        if allowed:
+            text += f"; allowed: {allowed}"
+        if mend:
+            text += f"; {mend}"
+        super().__init__(text + ".")
+
+
+class OutputError(RtsimError):
+    """A file or socket failed while the flight itself was sound."""
+
+    exit_code = EXIT_OUTPUT_FAILED
+
+
+class OverrunStop(RtsimError):
+    """The overrun policy ``stop:N`` ended a real-time flight."""
+
+    exit_code = EXIT_OVERRUN
+
+
+class TrimError(InputError):
+    """No trim was found; the message names the residual that did not close."""

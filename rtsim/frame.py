@@ -1,0 +1,118 @@
+"""The frame: one row of named signals per step, declared here once and read by everyone else.
+
+The recorder, Rerun, MAVLink, plots and reports take names, units and groups from ``SIGNALS``;
+kernels write through ``COLUMN``. A row describes the aircraft at the *start* of the frame (time
+``frame * dt``) together with the command that acts during it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import namedtuple
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One column of the frame."""
+
+    name: str
+    """Column name; the unit is part of it unless the signal is dimensionless."""
+    unit: str
+    """Unit as shown on axes; empty where dimensionless."""
+    group: str
+    """The plot and table it belongs to."""
+    description: str
+    """One sentence for people."""
+
+
+SIGNALS: tuple[Signal, ...] = (
+    Signal("frame", "", "time", "Number of the frame, from 0."),
+    Signal("time_s", "s", "time", "Simulated time at the start of the frame, frame * dt."),
+    Signal("airspeed_kt", "kn", "speed", "Horizontal true airspeed, signed; equals calibrated airspeed at sea level."),
+    Signal("airspeed_reference_kt", "kn", "speed", "Airspeed reference after its 1.5 rad/s filter."),
+    Signal("nacelle_deg", "deg", "nacelle", "Nacelle angle: 90 helicopter, 0 airplane."),
+    Signal("nacelle_reference_deg", "deg", "nacelle", "Nacelle angle the command asks for, before the 3 rad/s actuator."),
+    Signal("altitude_m", "m", "altitude", "Height above the ground."),
+    Signal("pitch_deg", "deg", "attitude", "Pitch attitude, nose up positive."),
+    Signal("flapping_deg", "deg", "flapping", "Magnitude of gimbal flapping relative to the mast."),
+    Signal("stick", "", "controls", "Longitudinal stick after protection, -1 aft to 1 forward."),
+    Signal("lever", "", "controls", "Power lever after protection, 0 to 1."),
+    Signal("pilot_stick", "", "controls", "Longitudinal stick as the pilot gave it."),
+    Signal("pilot_lever", "", "controls", "Power lever as the pilot gave it."),
+    Signal("pilot_nacelle_rate_deg_s", "deg/s", "nacelle", "Nacelle rate as the pilot gave it."),
+    Signal("nacelle_command_rate_deg_s", "deg/s", "nacelle", "Nacelle rate that acts, after protection, detents and limits."),
+    Signal("nacelle_rate_deg_s", "deg/s", "nacelle", "Rate of the nacelle angle."),
+    Signal("airspeed_command_kt", "kn", "speed", "Airspeed of the scenario before its filter."),
+    Signal("altitude_reference_m", "m", "altitude", "Altitude to hold."),
+    Signal("airspeed_rate_kt_s", "kn/s", "speed", "Rate of the airspeed."),
+    Signal("ground_speed_kt", "kn", "speed", "Horizontal speed over the ground."),
+    Signal("climb_rate_m_s", "m/s", "altitude", "Vertical speed, up positive."),
+    Signal("distance_m", "m", "position", "Distance flown over the ground."),
+    Signal("flight_path_deg", "deg", "attitude", "Angle of the air-relative flight path above the horizon."),
+    Signal("angle_of_attack_deg", "deg", "attitude", "Fuselage angle of attack as used for scheduling."),
+    Signal("pitch_rate_deg_s", "deg/s", "attitude", "Body pitch rate."),
+    Signal("body_u_m_s", "m/s", "position", "Air-relative velocity along the body x axis (forward)."),
+    Signal("body_w_m_s", "m/s", "position", "Air-relative velocity along the body z axis (down)."),
+    Signal("load_factor", "", "loads", "Normal load factor, 1 in level flight."),
+    Signal("coning_deg", "deg", "flapping", "Coning angle of the blades, precone included."),
+    Signal("longitudinal_flapping_deg", "deg", "flapping", "Cosine gimbal flapping; positive tilts the disc forward."),
+    Signal("lateral_flapping_deg", "deg", "flapping", "Sine gimbal flapping."),
+    Signal("collective_75_deg", "deg", "controls", "Collective pitch at 75 % radius."),
+    Signal("cyclic_deg", "deg", "controls", "Longitudinal cyclic pitch theta1s; negative tilts the disc forward."),
+    Signal("elevator_deg", "deg", "controls", "Elevator, trailing edge down positive."),
+    Signal("flap_deg", "deg", "controls", "Flap deflection of the flap schedule."),
+    Signal("thrust_per_rotor_lb", "lb", "loads", "Thrust of one rotor along its mast."),
+    Signal("power_shp", "shp", "power", "Shaft power of both rotors."),
+    Signal("engine_power_shp", "shp", "power", "Engine power: shaft power of both rotors / 0.93."),
+    Signal("mast_torque_inlb", "in lb", "power", "Torque of one mast."),
+    Signal("rotor_speed_rpm", "rpm", "power", "Rotor speed (held by an ideal governor)."),
+    Signal("margin_kt", "kn", "corridor", "Signed margin to the nearer corridor boundary."),
+    Signal("margin_low_kt", "kn", "corridor", "Airspeed above the low-speed boundary."),
+    Signal("margin_high_kt", "kn", "corridor", "Airspeed below the high-speed boundary."),
+    Signal("nacelle_forward_deg", "deg", "corridor", "Nacelle travel towards airplane mode before a boundary."),
+    Signal("nacelle_aft_deg", "deg", "corridor", "Nacelle travel towards helicopter mode before a boundary."),
+    Signal("corridor_level", "", "corridor", "0 clear, 1 caution, 2 warning, 3 exceedance (after persistence and hysteresis)."),
+    Signal("on_downstop", "", "nacelle", "1 while the nacelles rest on the airplane-mode stop."),
+    Signal("control_on_stop", "", "controls", "1 while stick, lever, cyclic or elevator is on a stop."),
+    Signal("pilot_mode", "", "controls", "Who flies: 0 MOCM, 1 external command, 2 hold."),
+)
+"""Every signal of the history, in the order of the columns and of the history hash."""
+
+TIMING_SIGNALS: tuple[Signal, ...] = (
+    Signal("lateness_us", "us", "loop", "Frame start minus its deadline."),
+    Signal("work_us", "us", "loop", "Wall time from frame start to ring push."),
+    Signal("work_cpu_us", "us", "loop", "Thread CPU time from frame start to ring push."),
+    Signal("overruns", "", "loop", "Frames so far that finished after the next deadline."),
+    Signal("telemetry_dropped", "", "loop", "Rows so far that the view was too slow to take."),
+)
+"""Wall-clock columns of a live flight; logged beside the history and never part of its hash."""
+
+SIGNAL_NAMES: tuple[str, ...] = tuple(signal.name for signal in SIGNALS)
+SIGNAL_COUNT = len(SIGNALS)
+
+_ColumnType = namedtuple("_ColumnType", SIGNAL_NAMES)  # type: ignore[misc]  # names are data
+COLUMN = _ColumnType(*range(SIGNAL_COUNT))
+"""Column number by signal name: ``COLUMN.airspeed_kt``; usable inside compiled kernels."""
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def history_sha256(chunks: Sequence[FloatArray]) -> str:
+    """Hash a frame history: little-endian float64, whole columns in declared order.
+
+    Args:
+        chunks: Consecutive pieces of the history, each of shape (frames, SIGNAL_COUNT).
+
+    Returns:
+        The SHA-256 as 64 hexadecimal digits.
+    """
+    digest = hashlib.sha256()
+    for column in range(SIGNAL_COUNT):
+        for chunk in chunks:
+            digest.update(np.ascontiguousarray(chunk[:, column], dtype="<f8").tobytes())
+    return digest.hexdigest()
