@@ -36,7 +36,9 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("airspeed_kt", "kn", "speed", "Horizontal true airspeed, signed; equals calibrated airspeed at sea level."),
     Signal("airspeed_reference_kt", "kn", "speed", "Airspeed reference after its 1.5 rad/s filter."),
     Signal("nacelle_deg", "deg", "nacelle", "Nacelle angle: 90 helicopter, 0 airplane."),
-    Signal("nacelle_reference_deg", "deg", "nacelle", "Nacelle angle the command asks for, before the 3 rad/s actuator."),
+    Signal(
+        "nacelle_reference_deg", "deg", "nacelle", "Nacelle angle the command asks for, before the 3 rad/s actuator."
+    ),
     Signal("altitude_m", "m", "altitude", "Height above the ground."),
     Signal("pitch_deg", "deg", "attitude", "Pitch attitude, nose up positive."),
     Signal("flapping_deg", "deg", "flapping", "Magnitude of gimbal flapping relative to the mast."),
@@ -45,7 +47,12 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("pilot_stick", "", "controls", "Longitudinal stick as the pilot gave it."),
     Signal("pilot_lever", "", "controls", "Power lever as the pilot gave it."),
     Signal("pilot_nacelle_rate_deg_s", "deg/s", "nacelle", "Nacelle rate as the pilot gave it."),
-    Signal("nacelle_command_rate_deg_s", "deg/s", "nacelle", "Nacelle rate that acts, after protection, detents and limits."),
+    Signal(
+        "nacelle_command_rate_deg_s",
+        "deg/s",
+        "nacelle",
+        "Nacelle rate that acts, after protection, detents and limits.",
+    ),
     Signal("nacelle_rate_deg_s", "deg/s", "nacelle", "Rate of the nacelle angle."),
     Signal("airspeed_command_kt", "kn", "speed", "Airspeed of the scenario before its filter."),
     Signal("altitude_reference_m", "m", "altitude", "Altitude to hold."),
@@ -76,7 +83,12 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("margin_high_kt", "kn", "corridor", "Airspeed below the high-speed boundary."),
     Signal("nacelle_forward_deg", "deg", "corridor", "Nacelle travel towards airplane mode before a boundary."),
     Signal("nacelle_aft_deg", "deg", "corridor", "Nacelle travel towards helicopter mode before a boundary."),
-    Signal("corridor_level", "", "corridor", "0 clear, 1 caution, 2 warning, 3 exceedance (after persistence and hysteresis)."),
+    Signal(
+        "corridor_level",
+        "",
+        "corridor",
+        "0 clear, 1 caution, 2 warning, 3 exceedance (after persistence and hysteresis).",
+    ),
     Signal("on_downstop", "", "nacelle", "1 while the nacelles rest on the airplane-mode stop."),
     Signal("control_on_stop", "", "controls", "1 while stick, lever, cyclic or elevator is on a stop."),
     Signal("pilot_mode", "", "controls", "Who flies: 0 MOCM, 1 external command, 2 hold."),

@@ -1,0 +1,193 @@
+"""The ``rtsim`` command: collects the command modules and turns every ending into a sentence and an exit code."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from rtsim import __version__
+from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError
+
+EXIT_INTERNAL_ERROR = 70
+EXIT_BROKEN_PIPE = 141
+EXIT_INTERRUPTED = 130
+EXIT_TERMINATED = 143
+
+COMMAND_MODULES = ("fly", "replay", "analysis", "corridor", "pilot", "model", "log", "check", "timing")
+"""Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
+
+
+class Terminated(SystemExit):
+    """SIGTERM arrived: unwinds like Ctrl-C, so that files are closed, and ends with exit code 143."""
+
+    def __init__(self) -> None:
+        super().__init__(EXIT_TERMINATED)
+
+
+def database_hash() -> str:
+    """Give the SHA-256 of the shipped LPV database, or say why there is none."""
+    if importlib.util.find_spec("rtsim.lpv.database") is None:
+        return "none"
+    database = importlib.import_module("rtsim.lpv.database").load_database()
+    return str(database.content_hash)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        sys.stdout.write(f"rtsim {__version__} (database {database_hash()})\n")
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version and the hash of the database.", callback=_print_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Fly the Bell XV-15 tiltrotor in real time, a virtual pilot at the stick, its conversion corridor beside it.
+
+    Start with: rtsim fly
+    """
+
+
+def build_app() -> typer.Typer:
+    """Build the command with every command module registered."""
+    app = typer.Typer(
+        name="rtsim",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+    )
+    app.callback()(_root)
+    for name in COMMAND_MODULES:
+        module_name = f"rtsim.cli.{name}"
+        try:
+            module = importlib.import_module(module_name)
+        except ModuleNotFoundError as missing:
+            if missing.name != module_name:
+                raise
+            continue
+        module.register(app)
+    return app
+
+
+def _fail(sentence: str) -> None:
+    try:
+        sys.stderr.write(f"rtsim: error: {' '.join(sentence.split())}\n")
+        sys.stderr.flush()
+    except OSError:
+        pass  # nobody is left to tell; the exit code still says it
+
+
+def _silence(*, stdout_only: bool = False) -> None:
+    """Point the streams at nothing, so that the interpreter's last flush cannot complain."""
+    sink = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout,) if stdout_only else (sys.stdout, sys.stderr):
+        try:
+            os.dup2(sink, stream.fileno())
+        except (OSError, ValueError):
+            continue  # a replaced stream without descriptor has nothing to flush to
+    os.close(sink)
+
+
+def _raise_terminated(signal_number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of a handler
+    raise Terminated
+
+
+def _describe(error: OSError) -> str:
+    name = error.filename if error.filename is not None else "output"
+    if isinstance(name, bytes):
+        name = os.fsdecode(name)
+    return f"{name}: {error.strerror or error}"
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and give its exit code.
+
+    Args:
+        arguments: The words after ``rtsim``; None takes them from the process.
+
+    Returns:
+        0 done and all expectations held; 1 an expectation failed or a replay differs; 2 bad input; 3 stopped by the
+        overrun policy; 4 a file or socket failed; 70 a fault of rtsim's own; 130 Ctrl-C; 141 the reader of the output
+        went away; 143 SIGTERM.
+    """
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _raise_terminated)
+    try:
+        code = _invoke(arguments)
+        sys.stdout.flush()
+    except RtsimError as error:
+        _fail(str(error))
+        return error.exit_code
+    except KeyboardInterrupt:
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:
+        _silence()
+        return EXIT_BROKEN_PIPE
+    except OSError as error:
+        _silence(stdout_only=True)
+        _fail(_describe(error))
+        return EXIT_OUTPUT_FAILED
+    except Exception:  # noqa: BLE001 - the last resort: a fault of ours, told apart from the user's by its exit code
+        import traceback
+
+        traceback.print_exc()
+        _fail("this is a fault of rtsim itself, not of your input; please report it with the lines above.")
+        return EXIT_INTERNAL_ERROR
+    return code
+
+
+def _invoke(arguments: Sequence[str] | None) -> int:
+    command = typer.main.get_command(build_app())
+    try:
+        result = command.main(args=arguments, prog_name="rtsim", standalone_mode=False)
+    except SystemExit as end:
+        # The parser turns a broken pipe into exit 1, which is our code for a failed expectation.
+        if isinstance(end.__context__, BrokenPipeError):
+            raise end.__context__ from None
+        return end.code if isinstance(end.code, int) else int(end.code is not None)
+    except typer.Abort:
+        return EXIT_INTERRUPTED
+    except RuntimeError as end:
+        if isinstance(end, typer.Exit):
+            return int(end.exit_code)
+        raise
+    except Exception as error:
+        message = getattr(error, "format_message", None)
+        if message is None:
+            raise
+        return _usage_error(error, str(message()))
+    return result if isinstance(result, int) else 0
+
+
+def _usage_error(error: Exception, message: str) -> int:
+    """Tell a mistake in the command line, and where its help is."""
+    context = getattr(error, "ctx", None)
+    path = context.command_path if context is not None else "rtsim"
+    if type(error).__name__ == "NoArgsIsHelpError":
+        sys.stderr.write(message + "\n")
+    else:
+        _fail(f"{message} Try '{path} --help'.")
+    return EXIT_BAD_INPUT
+
+
+def main() -> None:
+    """Entry point of the ``rtsim`` command."""
+    sys.exit(run())
+
+
+if __name__ == "__main__":
+    main()
