@@ -11,6 +11,7 @@ import hashlib
 from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -108,7 +109,7 @@ SIGNAL_NAMES: tuple[str, ...] = tuple(signal.name for signal in SIGNALS)
 SIGNAL_COUNT = len(SIGNALS)
 
 _ColumnType = namedtuple("_ColumnType", SIGNAL_NAMES)  # type: ignore[misc]  # names are data
-COLUMN = _ColumnType(*range(SIGNAL_COUNT))
+COLUMN: Any = _ColumnType(*range(SIGNAL_COUNT))
 """Column number by signal name: ``COLUMN.airspeed_kt``; usable inside compiled kernels."""
 
 FloatArray = npt.NDArray[np.float64]
