@@ -7,6 +7,14 @@ A function named after a unit takes a number *in that unit* and returns SI: ``kt
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+Quantity = TypeVar("Quantity", float, "npt.NDArray[np.float64]")
+"""A number or an array of numbers; what goes in comes out."""
 
 KNOT = 1852.0 / 3600.0
 """One knot [m/s], exact by definition."""
@@ -38,46 +46,46 @@ STICK_HALF_TRAVEL_IN = 4.8
 """Longitudinal stick travel from neutral to either stop [in], NASA CR-166536."""
 
 
-def kt(value: float) -> float:
+def kt(value: Quantity) -> Quantity:
     """Airspeed in knots to m/s."""
     return value * KNOT
 
 
-def to_kt(value: float) -> float:
+def to_kt(value: Quantity) -> Quantity:
     """Airspeed in m/s to knots."""
     return value / KNOT
 
 
-def deg(value: float) -> float:
+def deg(value: Quantity) -> Quantity:
     """Angle in degrees to radians."""
     return value * DEGREE
 
 
-def to_deg(value: float) -> float:
+def to_deg(value: Quantity) -> Quantity:
     """Angle in radians to degrees."""
     return value / DEGREE
 
 
-def ft(value: float) -> float:
+def ft(value: Quantity) -> Quantity:
     """Length in feet to metres."""
     return value * FOOT
 
 
-def to_ft(value: float) -> float:
+def to_ft(value: Quantity) -> Quantity:
     """Length in metres to feet."""
     return value / FOOT
 
 
-def lb(value: float) -> float:
+def lb(value: Quantity) -> Quantity:
     """Mass in pounds to kilograms."""
     return value * POUND
 
 
-def rpm(value: float) -> float:
+def rpm(value: Quantity) -> Quantity:
     """Rotational speed in revolutions per minute to rad/s."""
     return value * RPM
 
 
-def to_rpm(value: float) -> float:
+def to_rpm(value: Quantity) -> Quantity:
     """Rotational speed in rad/s to revolutions per minute."""
     return value / RPM

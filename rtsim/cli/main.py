@@ -180,7 +180,7 @@ def _usage_error(error: Exception, message: str) -> int:
     if type(error).__name__ == "NoArgsIsHelpError":
         sys.stderr.write(message + "\n")
     else:
-        _fail(f"{message} Try '{path} --help'.")
+        _fail(f"{message.rstrip('.')}. Try '{path} --help'.")
     return EXIT_BAD_INPUT
 
 

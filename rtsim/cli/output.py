@@ -1,4 +1,4 @@
-"""What the commands say and where: one JSON object on stdout, everything for people on stderr."""
+"""What the commands say and where: answers on stdout, one JSON object if asked for; all else on stderr."""
 
 from __future__ import annotations
 
@@ -6,41 +6,47 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any, Literal
+
+from rtsim.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
 class _LazyConsole:
-    """A rich console on stderr that is built when first used, since importing rich costs start-up time."""
+    """A rich console that is built when first used, since importing rich costs start-up time."""
 
-    __slots__ = ("_console", "_stream")
+    __slots__ = ("_console", "_name", "_stream")
 
-    def __init__(self) -> None:
+    def __init__(self, name: Literal["stdout", "stderr"]) -> None:
+        self._name = name
         self._console: Console | None = None
         self._stream: object = None
 
     def real(self) -> Console:
-        """Give the rich console for the present ``sys.stderr``."""
+        """Give the rich console for the present stream of that name."""
         # A console keeps the stream it was made with; tests and shells replace sys.stderr, so follow it.
-        if self._console is None or self._stream is not sys.stderr:
+        stream = getattr(sys, self._name)
+        if self._console is None or self._stream is not stream:
             from rich.console import Console
 
-            self._stream = sys.stderr
-            self._console = Console(file=sys.stderr, highlight=False)
+            self._stream = stream
+            self._console = Console(file=stream, highlight=False)
         return self._console
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.real(), name)
 
 
-console = _LazyConsole()
-"""Where text, tables and progress for people go: a ``rich.console.Console`` on stderr."""
+console = _LazyConsole("stderr")
+"""Where progress, logs, warnings and remarks go: a ``rich.console.Console`` on stderr."""
+results = _LazyConsole("stdout")
+"""Where tables and sentences that answer the command go when ``--json`` is not asked for."""
 
 
 def to_jsonable(value: object) -> object:
@@ -122,3 +128,28 @@ def progress(description: str, *, total: float) -> Iterator[Callable[[float], No
     with Progress(*columns, console=console.real(), transient=False) as bar:
         task = bar.add_task(description, total=total)
         yield lambda amount: bar.advance(task, amount)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside the target; renamed at the end, so that a file is whole or not there.
+
+    Args:
+        path: The target; an existing file is replaced.
+
+    Yields:
+        The temporary path to write, with the suffix of the target.
+
+    Raises:
+        OutputError: Writing or renaming failed.
+    """
+    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}.") from error
+    finally:
+        # After success there is nothing left under this name; after Ctrl-C or a fault there must not be.
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)

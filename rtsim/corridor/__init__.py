@@ -1,0 +1,16 @@
+"""The conversion corridor: boundaries, signed margins and warning levels.
+
+Import ``rtsim.corridor.corridor_kernels`` for the compiled functions; this package itself starts without numba.
+"""
+
+from rtsim.corridor.boundaries import (
+    CORRIDOR_NAMES,
+    LEVEL_NAMES,
+    Boundary,
+    Corridor,
+    CorridorName,
+    Levels,
+    load_corridor,
+)
+
+__all__ = ["CORRIDOR_NAMES", "LEVEL_NAMES", "Boundary", "Corridor", "CorridorName", "Levels", "load_corridor"]

@@ -1,0 +1,192 @@
+"""``rtsim corridor``: the boundaries and centre line of the conversion corridor, and the margins of a point."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rtsim.cli.output import console, emit_json, results, whole_file
+from rtsim.errors import InputError
+
+if TYPE_CHECKING:
+    from rtsim.command import Margins
+    from rtsim.corridor import Boundary, Corridor
+
+_DIGITS = 6
+_TABLE_ANGLES_DEG = (90.0, 85.0, 80.0, 75.0, 70.0, 65.0, 60.0, 55.0, 50.0, 45.0, 40.0, 30.0, 20.0, 10.0, 0.5, 0.0)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the app.
+
+    Args:
+        app: The ``rtsim`` command.
+    """
+    app.command("corridor")(corridor_command)
+
+
+def corridor_command(
+    *,
+    corridor: Annotated[str, typer.Option(help="Which corridor: design or flight.")] = "design",
+    airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed of a point [kn].")] = None,
+    nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle of the point [deg], 90 helicopter.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
+) -> None:
+    """Show the boundaries and centre line of the conversion corridor; with a point, its margins.
+
+    Args:
+        corridor: Name of the corridor.
+        airspeed_kt: Airspeed of a point [kn].
+        nacelle_deg: Nacelle angle of the point [deg].
+        json: Print one JSON object on stdout.
+        plot: File to draw into.
+
+    Raises:
+        InputError: A value is outside its range, or only half of a point is given.
+    """
+    from rtsim.corridor import load_corridor
+    from rtsim.units import deg, kt
+
+    point = _point(airspeed_kt, nacelle_deg)
+    chosen = load_corridor(corridor)
+    result: dict[str, Any] = {"corridor_name": chosen.name, "boundaries": _boundaries(chosen)}
+    if point is not None:
+        margins = chosen.margins(kt(point[0]), deg(point[1]))
+        result |= _point_result(chosen, point, margins)
+    if plot is not None:
+        _draw(chosen, point, plot)
+        result["plot_file"] = str(plot)
+    if json:
+        emit_json(result)
+        return
+    if point is not None:
+        _print_point(result)
+    else:
+        _print_table(chosen)
+    if plot is not None:
+        console.print(f"Drew {plot}")
+
+
+def _point(airspeed_kt: float | None, nacelle_deg: float | None) -> tuple[float, float] | None:
+    if airspeed_kt is None and nacelle_deg is None:
+        return None
+    if airspeed_kt is None or nacelle_deg is None:
+        missing = "--airspeed-kt" if airspeed_kt is None else "--nacelle-deg"
+        raise InputError("a point needs airspeed and nacelle angle", key=missing, mend=f"add {missing}")
+    if not math.isfinite(airspeed_kt) or not -100.0 <= airspeed_kt <= 400.0:
+        raise InputError("airspeed out of range", key="--airspeed-kt", value=airspeed_kt, allowed="-100 to 400 kn")
+    if not 0.0 <= nacelle_deg <= 95.0:
+        raise InputError("nacelle angle out of range", key="--nacelle-deg", value=nacelle_deg, allowed="0 to 95 deg")
+    return airspeed_kt, nacelle_deg
+
+
+def _side(boundary: Boundary) -> dict[str, Any]:
+    from rtsim.units import to_deg, to_kt
+
+    return {
+        "nacelle_deg": [round(to_deg(angle), _DIGITS) for angle in boundary.nacelle.tolist()],
+        "speed_kt": [round(to_kt(speed), _DIGITS) for speed in boundary.speed.tolist()],
+        "kind": boundary.kind,
+        "source": boundary.source,
+    }
+
+
+def _boundaries(corridor: Corridor) -> dict[str, Any]:
+    from rtsim.units import deg, to_deg, to_kt
+
+    angles = sorted(
+        {round(angle, 9) for angle in _side(corridor.low)["nacelle_deg"] + _side(corridor.high)["nacelle_deg"]}
+    )
+    return {
+        "low": _side(corridor.low),
+        "high": _side(corridor.high),
+        "centre": {
+            "nacelle_deg": angles,
+            "speed_kt": [round(to_kt(float(corridor.centre_speed(deg(angle)))), _DIGITS) for angle in angles],
+        },
+        "downstop": {
+            "nacelle_deg": round(to_deg(corridor.downstop_nacelle), _DIGITS),
+            "high_kt": round(to_kt(corridor.downstop_speed), _DIGITS),
+        },
+    }
+
+
+def _point_result(corridor: Corridor, point: tuple[float, float], margins: Margins) -> dict[str, Any]:
+    from rtsim.units import deg, to_deg, to_kt
+
+    airspeed_kt, nacelle_deg = point
+    return {
+        "airspeed_kt": airspeed_kt,
+        "nacelle_deg": nacelle_deg,
+        "low_kt": round(airspeed_kt - to_kt(margins.low), _DIGITS),
+        "high_kt": round(airspeed_kt + to_kt(margins.high), _DIGITS),
+        "centre_kt": round(to_kt(float(corridor.centre_speed(deg(nacelle_deg)))), _DIGITS),
+        "margin_low_kt": round(to_kt(margins.low), _DIGITS),
+        "margin_high_kt": round(to_kt(margins.high), _DIGITS),
+        "nacelle_forward_deg": round(to_deg(margins.nacelle_forward), _DIGITS),
+        "nacelle_aft_deg": round(to_deg(margins.nacelle_aft), _DIGITS),
+        "inside": min(margins.low, margins.high) >= 0.0,
+    }
+
+
+def _print_point(result: dict[str, Any]) -> None:
+    where = "inside" if result["inside"] else "OUTSIDE"
+    results.print(
+        f"{result['airspeed_kt']:g} kn at nacelle {result['nacelle_deg']:g} deg is {where} "
+        f"the {result['corridor_name']} corridor ({result['low_kt']:.1f} to {result['high_kt']:.1f} kn)."
+    )
+    results.print(f"  margin to the low-speed side   {result['margin_low_kt']:+8.1f} kn")
+    results.print(f"  margin to the high-speed side  {result['margin_high_kt']:+8.1f} kn")
+    results.print(f"  nacelle travel forward         {result['nacelle_forward_deg']:+8.1f} deg")
+    results.print(f"  nacelle travel aft             {result['nacelle_aft_deg']:+8.1f} deg")
+
+
+def _print_table(corridor: Corridor) -> None:
+    from rich.table import Table
+
+    from rtsim.units import deg, to_kt
+
+    table = Table(title=corridor.title)
+    for heading in ("nacelle [deg]", "low [kn]", "centre [kn]", "high [kn]"):
+        table.add_column(heading, justify="right")
+    for angle in _TABLE_ANGLES_DEG:
+        speeds = (corridor.low_speed(deg(angle)), corridor.centre_speed(deg(angle)), corridor.high_speed(deg(angle)))
+        # Adding zero turns a rounded -0.0 into 0.0.
+        table.add_row(f"{angle:g}", *(f"{round(to_kt(float(speed)), 1) + 0.0:.1f}" for speed in speeds))
+    results.print(table)
+    results.print(f"Low side: {corridor.low.kind}. {corridor.low.source}", markup=False)
+    results.print(f"High side: {corridor.high.kind}. {corridor.high.source}", markup=False)
+
+
+def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> None:
+    """Draw the corridor, airspeed across and nacelle angle up, helicopter mode on top as in the paper."""
+    formats = (".png", ".svg", ".pdf")
+    if path.suffix.lower() not in formats:
+        raise InputError("unknown picture format", key="--plot", value=str(path), allowed=", ".join(formats))
+    import numpy as np
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from rtsim.units import to_deg, to_kt
+
+    end = min(corridor.low.nacelle[-1], corridor.high.nacelle[-1])
+    angle = np.union1d(np.linspace(0.0, end, 191), [corridor.downstop_nacelle, corridor.downstop_nacelle * 1.0001])
+    low, high = np.asarray(corridor.low_speed(angle)), np.asarray(corridor.high_speed(angle))
+    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.fill_betweenx(to_deg(angle), to_kt(low), to_kt(high), color="#2a9d8f", alpha=0.15, label="inside")
+    axes.plot(to_kt(low), to_deg(angle), color="#c1121f", label=f"low side: {corridor.low.kind}")
+    axes.plot(to_kt(high), to_deg(angle), color="#e07a00", label=f"high side: {corridor.high.kind}")
+    axes.plot(to_kt(np.asarray(corridor.centre_speed(angle))), to_deg(angle), "k--", linewidth=1.0, label="centre line")
+    if point is not None:
+        axes.plot(point[0], point[1], "o", color="#1d3557", label=f"{point[0]:g} kn, {point[1]:g} deg")
+    axes.set(xlabel="airspeed [kn]", ylabel="nacelle angle [deg]", title=corridor.title, ylim=(-2.0, 97.0))
+    axes.grid(alpha=0.3)
+    axes.legend(loc="upper right", fontsize="small")
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=150)

@@ -1,0 +1,219 @@
+"""The conversion corridor: boundaries with their sources, signed margins, centre line."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from rtsim.command import Margins
+from rtsim.errors import InputError
+from rtsim.frame import FloatArray
+from rtsim.units import deg, kt
+
+if TYPE_CHECKING:
+    from rtsim.corridor.corridor_kernels import CorridorTables
+
+CorridorName = Literal["design", "flight"]
+CORRIDOR_NAMES: tuple[CorridorName, ...] = ("design", "flight")
+LEVEL_NAMES = ("clear", "caution", "warning", "exceedance")
+"""Words for the levels 0 to 3 of ``corridor_level``."""
+
+_FILE = "corridor.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """One side of the corridor: a polyline of airspeed over nacelle angle."""
+
+    nacelle: FloatArray
+    """Nacelle angles of the corners, ascending, shape (n,) [rad]."""
+    speed: FloatArray
+    """Airspeeds of the corners, shape (n,) [m/s]; nowhere rising with the nacelle angle."""
+    kind: str
+    """What physically limits here."""
+    source: str
+    """Publication and figure."""
+
+    def __post_init__(self) -> None:
+        nacelle, speed = self.nacelle, self.speed
+        if nacelle.ndim != 1 or nacelle.shape != speed.shape or nacelle.size < 2:
+            raise InputError("a boundary needs as many speeds as nacelle angles, at least two", key="speed_kn")
+        if not (np.all(np.isfinite(nacelle)) and np.all(np.isfinite(speed))):
+            raise InputError("a boundary holds a value that is not a number", key="speed_kn")
+        if np.any(np.diff(nacelle) <= 0.0):
+            raise InputError("the nacelle angles of a boundary must fall strictly", key="nacelle_deg")
+        if np.any(np.diff(speed) > 0.0):
+            raise InputError("the speeds of a boundary must not fall as the nacelle angle falls", key="speed_kn")
+
+    def at(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
+        """Airspeed of the boundary [m/s]; constant beyond its ends.
+
+        Args:
+            nacelle_angle: Nacelle angle, one value or an array of any shape [rad].
+        """
+        speed = np.interp(nacelle_angle, self.nacelle, self.speed)
+        return float(speed) if np.ndim(speed) == 0 else speed
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """When the corridor cautions, warns and counts an exceedance."""
+
+    threshold: FloatArray
+    """Margins below which caution, warning and exceedance begin, shape (3,), falling [m/s]."""
+    hysteresis: float
+    """How far above its threshold the margin must rise before a level ends [m/s]."""
+    rise_time: float
+    """How long the margin must be below a threshold before the level begins [s]."""
+    fall_time: float
+    """How long the margin must be above threshold + hysteresis before the level ends [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Corridor:
+    """A conversion corridor: the airspeeds that each nacelle angle allows."""
+
+    name: str
+    """Name by which it is chosen."""
+    title: str
+    """Title for plots."""
+    low: Boundary
+    """Low-speed side."""
+    high: Boundary
+    """High-speed side off the downstop."""
+    downstop_nacelle: float
+    """At and below this angle the nacelles rest on the airplane-mode stop [rad]."""
+    downstop_speed: float
+    """High-speed side on the downstop [m/s]."""
+    levels: Levels
+    """Warning levels of its margins."""
+
+    def low_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
+        """Lowest allowed airspeed, signed [m/s].
+
+        Args:
+            nacelle_angle: Nacelle angle, one value or an array [rad].
+        """
+        return self.low.at(nacelle_angle)
+
+    def high_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
+        """Highest allowed airspeed [m/s]; steps up on the downstop.
+
+        Args:
+            nacelle_angle: Nacelle angle, one value or an array [rad].
+        """
+        on_downstop = np.asarray(nacelle_angle) <= self.downstop_nacelle
+        speed = np.where(on_downstop, self.downstop_speed, self.high.at(nacelle_angle))
+        return float(speed) if speed.ndim == 0 else speed
+
+    def centre_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
+        """Airspeed midway between the boundaries for flight in conversion [m/s].
+
+        Rearward speeds and the higher limit on the downstop are left out of the middle: the line runs from half the
+        high-speed limit in helicopter mode to midway between stall and flap limit in airplane mode.
+
+        Args:
+            nacelle_angle: Nacelle angle, one value or an array [rad].
+        """
+        speed = 0.5 * (np.maximum(self.low.at(nacelle_angle), 0.0) + self.high.at(nacelle_angle))
+        return float(speed) if np.ndim(speed) == 0 else speed
+
+    def margins(self, airspeed: float, nacelle_angle: float) -> Margins:
+        """Signed distances to the boundaries, positive inside.
+
+        The nacelle margins are travels at fixed airspeed to the first angle that violates a boundary, or to the end of
+        the travel (0 and 95 deg) where none does. Outside, the one towards the violated boundary is negative: that
+        much travel the other way re-enters. Where no nacelle angle would do, both are minus the whole travel.
+
+        Args:
+            airspeed: Airspeed, signed [m/s].
+            nacelle_angle: Nacelle angle [rad].
+        """
+        from rtsim.corridor.corridor_kernels import MARGIN_COUNT, corridor_margins
+
+        out = np.empty(MARGIN_COUNT)
+        corridor_margins(self.tables(), airspeed, nacelle_angle, out)
+        return Margins(low=out[0].item(), high=out[1].item(), nacelle_forward=out[2].item(), nacelle_aft=out[3].item())
+
+    def inside(self, airspeed: float, nacelle_angle: float) -> bool:
+        """Tell whether a point lies inside or on a boundary.
+
+        Args:
+            airspeed: Airspeed, signed [m/s].
+            nacelle_angle: Nacelle angle [rad].
+        """
+        return bool(self.low_speed(nacelle_angle) <= airspeed <= self.high_speed(nacelle_angle))
+
+    def tables(self) -> CorridorTables:
+        """Give the ``CorridorTables`` of the compiled kernels."""
+        # Imported here: reading boundaries must not cost the start of numba.
+        from rtsim.corridor.corridor_kernels import CorridorTables
+
+        return CorridorTables(
+            low_nacelle=self.low.nacelle,
+            low_speed=self.low.speed,
+            high_nacelle=self.high.nacelle,
+            high_speed=self.high.speed,
+            downstop_nacelle=self.downstop_nacelle,
+            downstop_speed=self.downstop_speed,
+            level_threshold=self.levels.threshold,
+            level_hysteresis=self.levels.hysteresis,
+            level_rise_time=self.levels.rise_time,
+            level_fall_time=self.levels.fall_time,
+        )
+
+
+@cache
+def load_corridor(name: str = "design") -> Corridor:
+    """Load a built-in corridor.
+
+    Args:
+        name: ``design`` (NASA TM X-62407 attitude and stall limits) or ``flight`` (NASA TM 81244 power-on stall); both
+            share the high-speed side.
+
+    Raises:
+        InputError: There is no such corridor.
+    """
+    data = tomllib.loads(resources.files("rtsim.corridor").joinpath("data", _FILE).read_text(encoding="utf-8"))
+    if name not in data["corridor"]:
+        raise InputError("no such corridor", key="corridor", value=name, allowed=", ".join(data["corridor"]))
+    entry, levels = data["corridor"][name], data["levels"]
+    return Corridor(
+        name=name,
+        title=entry["title"],
+        low=_boundary(data["low"][entry["low"]], data["sources"]),
+        high=_boundary(data["high"][entry["high"]], data["sources"]),
+        downstop_nacelle=deg(data["downstop"]["nacelle_deg"]),
+        downstop_speed=kt(data["downstop"]["high_kn"]),
+        levels=Levels(
+            threshold=_read_only([kt(value) for value in levels["threshold_kn"]]),
+            hysteresis=kt(levels["hysteresis_kn"]),
+            rise_time=levels["rise_s"],
+            fall_time=levels["fall_s"],
+        ),
+    )
+
+
+def _boundary(entry: Mapping[str, Any], sources: Mapping[str, str]) -> Boundary:
+    source = entry["source"]
+    for code, text in sources.items():
+        if code in source:
+            source += f" [{code}: {text}]"
+    return Boundary(
+        nacelle=_read_only([deg(value) for value in reversed(entry["nacelle_deg"])]),
+        speed=_read_only([kt(value) for value in reversed(entry["speed_kn"])]),
+        kind=entry["kind"],
+        source=source,
+    )
+
+
+def _read_only(values: list[float]) -> FloatArray:
+    array = np.array(values, dtype=np.float64)
+    array.flags.writeable = False
+    return array
