@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aircraft.rotor_reader import read_rotor
+from rtsim.aircraft.rotor_reader import SEA_LEVEL_SOUND_SPEED, read_rotor
 from rtsim.aircraft.smooth_tables import smooth_curves, smooth_surface, stack_surfaces
 from rtsim.aircraft.table_kernels import Curves, FloatArray
 from rtsim.aircraft.tables import (
@@ -31,8 +31,6 @@ Data = dict[str, Any]
 
 SEA_LEVEL_DENSITY = 1.225
 """Density of the standard atmosphere at sea level [kg/m^3]."""
-SEA_LEVEL_SOUND_SPEED = 340.294
-"""Speed of sound of the standard atmosphere at sea level [m/s]."""
 ALPHA_GRID = np.radians(np.arange(-90.0, 90.5, 0.5))
 NACELLE_GRID = np.radians(np.arange(0.0, 96.0, 1.0))
 

@@ -30,7 +30,7 @@ COMPONENT = LOAD_COUNT + 2
 WORK_COUNT = COMPONENT + 12
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> float:
     """Flap deflection: the default off the downstop; on it, retracted linearly between two airspeeds [rad].
 
@@ -45,7 +45,7 @@ def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> f
     return controls.default_flap * (1.0 - retracted * on_stop)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def gravity_centre(mass: MassTables, nacelle: float) -> tuple[float, float]:
     """Stationline and waterline of the centre of gravity [m] (NASA CR-166536 shift law).
 
@@ -61,7 +61,7 @@ def gravity_centre(mass: MassTables, nacelle: float) -> tuple[float, float]:
     )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def commanded_controls(controls: ControlTables, stick: float, lever: float, nacelle: float) -> tuple[float, float, float]:
     """Collective at 75 % radius, longitudinal cyclic and elevator asked for by stick and lever [rad], within their limits.
 
@@ -80,7 +80,7 @@ def commanded_controls(controls: ControlTables, stick: float, lever: float, nace
     return low + lever * (high - low), cyclic, elevator
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def derivative(
     tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle: float, xdot: FloatArray, work: FloatArray
 ) -> None:
@@ -202,7 +202,7 @@ def derivative(
     work[COMPONENT + 9], work[COMPONENT + 10], work[COMPONENT + 11] = tail_x, tail_z, tail_m
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def outputs(
     tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle: float, y: FloatArray, xdot: FloatArray, work: FloatArray
 ) -> None:
@@ -231,7 +231,7 @@ def outputs(
     y[OUTPUT.flapping] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def step(
     tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle_path: FloatArray, dt: float, work: FloatArray
 ) -> None:

@@ -19,7 +19,7 @@ import math
 
 import numba
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.tables import Configuration, RotorTables
 
 # Entries of the load vector written by rotor_loads.
@@ -27,24 +27,34 @@ THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT = 0, 1,
 LOAD_COUNT = 6
 
 
-@numba.njit(cache=True)
-def _section(
-    rotor: RotorTables, station: int, alpha: float, mach: float
-) -> tuple[float, float]:
+@numba.njit(cache=True, error_model="numpy")
+def _section(rotor: RotorTables, station: int, alpha: float, mach: float) -> tuple[float, float]:
     """Lift and drag coefficient: Prandtl-Glauert from the data's Mach number, Lock drag rise relative to it."""
+    # Lift and drag share one grid over the whole circle: one cell and one Hermite basis serve both.
+    data = rotor.section
+    position = (alpha - rotor.section_start) / rotor.section_step
+    i = min(max(int(position), 0), data.shape[1] - 2)
+    t = position - i
+    t2 = t * t
+    t3 = t2 * t
+    h01 = 3.0 * t2 - 2.0 * t3
+    h00 = 1.0 - h01
+    h10 = t3 - 2.0 * t2 + t
+    h11 = t3 - t2
+    lift = h00 * data[station, i, 0] + h10 * data[station, i, 1] + h01 * data[station, i + 1, 0] + h11 * data[station, i + 1, 1]
+    drag = h00 * data[station, i, 2] + h10 * data[station, i, 3] + h01 * data[station, i + 1, 2] + h11 * data[station, i + 1, 3]
     mach = min(mach, 0.9)
-    reference = rotor.reference_mach[station]
-    glauert = math.sqrt((1.0 - reference * reference) / (1.0 - mach * mach))
-    lift = curve(rotor.lift, station, alpha) * glauert
-    drag = curve(rotor.drag, station, alpha) + rotor.root_drag[station]
+    lift *= rotor.reference_glauert[station] / math.sqrt(1.0 - mach * mach)
     critical = rotor.drag_divergence[station] - 0.1 * abs(lift) - 0.1077
     excess = max(0.0, mach - critical)
-    excess_reference = max(0.0, reference - critical)
-    drag += 20.0 * (excess**4 - excess_reference**4)
+    excess_reference = max(0.0, rotor.reference_mach[station] - critical)
+    excess *= excess
+    excess_reference *= excess_reference
+    drag += rotor.root_drag[station] + 20.0 * (excess * excess - excess_reference * excess_reference)
     return lift, max(drag, 0.003)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def rotor_loads(
     rotor: RotorTables,
     air: Configuration,
@@ -114,7 +124,7 @@ def rotor_loads(
     loads[SINE_MOMENT] *= 2.0 / azimuths
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def flapping_accelerations(
     rotor: RotorTables,
     om: float,
@@ -145,7 +155,7 @@ def flapping_accelerations(
     return b0dd, b1cdd, b1sdd
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def inflow_rates(
     rotor: RotorTables, air: Configuration, hub: tuple[float, float, float], inflow: tuple[float, float, float], loads: FloatArray
 ) -> tuple[float, float, float]:

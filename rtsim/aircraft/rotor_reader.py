@@ -12,6 +12,8 @@ from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.tables import RotorTables
 from rtsim.units import FOOT, SLUG_FOOT_SQUARED, deg
 
+SEA_LEVEL_SOUND_SPEED = 340.294
+"""Speed of sound of the standard atmosphere at sea level [m/s]."""
 SECTION_GRID = np.radians(np.arange(-180.0, 180.5, 1.0))
 
 
@@ -81,6 +83,7 @@ def read_rotor(data: dict[str, Any], choices: dict[str, Any]) -> RotorTables:
     thickness = np.interp(stations, own["thickness_rR"], own["thickness_fraction"])
     full, zero = own["root_drag_full_rR"], own["root_drag_zero_rR"]
     data_tip_speed = own["hover_tip_speed_of_section_data_ft_s"] * FOOT
+    reference_mach = stations * data_tip_speed / SEA_LEVEL_SOUND_SPEED
     azimuth = 2.0 * np.pi * np.arange(own["azimuth_stations"]) / own["azimuth_stations"]
     return RotorTables(
         radius=radius,
@@ -92,9 +95,21 @@ def read_rotor(data: dict[str, Any], choices: dict[str, Any]) -> RotorTables:
         twist=twist(stations) - twist(0.75),
         root_drag=own["root_drag_coefficient"] * np.clip((zero - stations) / (zero - full), 0.0, 1.0),
         drag_divergence=own["korn_factor"] - thickness,
-        reference_mach=stations * data_tip_speed / 340.294,
-        lift=lift._replace(values=weights @ lift.values, slopes=weights @ lift.slopes),
-        drag=drag._replace(values=weights @ drag.values, slopes=weights @ drag.slopes),
+        reference_mach=reference_mach,
+        reference_glauert=np.sqrt(1.0 - reference_mach**2),
+        section_start=lift.start,
+        section_step=lift.step,
+        section=np.ascontiguousarray(
+            np.stack(
+                [
+                    weights @ lift.values,
+                    weights @ lift.slopes * lift.step,
+                    weights @ drag.values,
+                    weights @ drag.slopes * drag.step,
+                ],
+                axis=-1,
+            )
+        ),
         cos_azimuth=np.cos(azimuth),
         sin_azimuth=np.sin(azimuth),
         precone=deg(rotor["precone_deg"]),

@@ -44,7 +44,7 @@ class Surfaces(NamedTuple):
     """Value, x derivative, y derivative and cross derivative, shape (surfaces, x points, y points, 4)."""
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def curve(table: Curves, which: int, argument: float) -> float:
     """Value of curve number ``which`` at ``argument``.
 
@@ -74,7 +74,7 @@ def curve(table: Curves, which: int, argument: float) -> float:
     )
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _cell(argument: float, start: float, step: float, points: int) -> tuple[int, float]:
     position = (argument - start) / step
     if position <= 0.0:
@@ -85,7 +85,7 @@ def _cell(argument: float, start: float, step: float, points: int) -> tuple[int,
     return i, position - i
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def surface(table: Surfaces, which: int, x: float, y: float) -> float:
     """Value of surface number ``which`` at (x, y), bicubic Hermite.
 

@@ -45,10 +45,14 @@ class RotorTables(NamedTuple):
     """Drag divergence Mach number at zero lift."""
     reference_mach: FloatArray
     """Mach number the section data were taken at."""
-    lift: Curves
-    """Section lift coefficient by station against angle of attack [rad]."""
-    drag: Curves
-    """Section drag coefficient by station against angle of attack [rad]."""
+    reference_glauert: FloatArray
+    """Prandtl-Glauert root at that Mach number."""
+    section_start: float
+    """First angle of attack of the section tables [rad]."""
+    section_step: float
+    """Spacing of the section tables [rad]."""
+    section: FloatArray
+    """Lift, its slope times the spacing, drag, its slope times the spacing; shape (stations, angles, 4)."""
     cos_azimuth: FloatArray
     """Cosines of the azimuth stations (0 aft, counter-clockwise)."""
     sin_azimuth: FloatArray

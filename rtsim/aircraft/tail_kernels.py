@@ -11,7 +11,7 @@ from rtsim.aircraft.table_kernels import FloatArray, curve, surface
 from rtsim.aircraft.tables import Configuration, TailTables
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _bracket(nodes: FloatArray, nacelle: float) -> tuple[int, float]:
     """Interval and weight of the upper end in descending nacelle angles."""
     last = nodes.shape[0] - 1
@@ -21,7 +21,7 @@ def _bracket(nodes: FloatArray, nacelle: float) -> tuple[int, float]:
     return k, min(max((nodes[k] - nacelle) / (nodes[k] - nodes[k + 1]), 0.0), 1.0)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) -> float:
     """Wing downwash at the tail before compressibility [rad]; linear in nacelle angle and flap between the tables.
 
@@ -44,7 +44,7 @@ def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) 
     return total
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def tail_load(
     tail: TailTables,
     air: Configuration,
