@@ -97,6 +97,10 @@ class PartWriter:
         self.flush()
         self._write(HEADER_PART, log_schema(self._metadata_json, json.loads(summary_json)).empty_table())
 
+    def close(self) -> None:
+        """Close the events file; the parts are closed already."""
+        self._events.close()
+
     def _write_rows(self, rows: FloatArray) -> None:
         columns = [pa.array(np.ascontiguousarray(rows[:, column])) for column in range(ROW_WIDTH)]
         self._write(part_name(self._parts + 1), pa.Table.from_arrays(columns, schema=self._schema))
@@ -159,6 +163,7 @@ def _serve(directory: Path) -> None:
             writer.flush()
     if writer is not None:
         writer.flush()
+        writer.close()
 
 
 def _handle(writer: PartWriter, kind: bytes, payload: bytes) -> None:
