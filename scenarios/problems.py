@@ -1,0 +1,202 @@
+"""Turns pydantic's findings about a scenario file into single sentences with key, value, range and mend."""
+
+from __future__ import annotations
+
+import difflib
+import types
+from collections.abc import Iterable
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from rtsim.errors import InputError
+
+_KINDS = {float: "a number", int: "a whole number", str: "a text in quotes", bool: "true or false"}
+
+
+def explain(error: ValidationError, model: type[BaseModel], file: str) -> list[InputError]:
+    """Translate everything pydantic found.
+
+    Args:
+        error: What validation raised.
+        model: The model that was validated.
+        file: The file, as shown to the user.
+
+    Returns:
+        One :class:`InputError` per problem, in the order of the file's keys.
+    """
+    found: dict[str, InputError] = {}
+    for item in error.errors():
+        location = tuple(part for part in item["loc"] if not _is_union_tag(part))
+        key = dotted(location)
+        found.setdefault(key, _explain_one(item, location, key, model, file))
+    return list(found.values())
+
+
+def dotted(location: Iterable[str | int]) -> str:
+    """Spell a place in a TOML file, such as ``programme.points[2].airspeed_kt``.
+
+    Args:
+        location: Keys and list positions from the top of the file.
+    """
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def closest(word: str, choices: Iterable[str]) -> list[str]:
+    """Choices ordered by likeness to a word, the likeliest first.
+
+    Args:
+        word: What the user wrote.
+        choices: What could have been meant.
+    """
+
+    def likeness(choice: str) -> float:
+        return difflib.SequenceMatcher(None, word.lower(), choice.lower()).ratio()
+
+    return sorted(choices, key=lambda choice: (-likeness(choice), choice))
+
+
+def suggestion(word: str, choices: Iterable[str], *, otherwise: str) -> str:
+    """An imperative that names the choice a user probably meant.
+
+    Args:
+        word: What the user wrote.
+        choices: What could have been meant.
+        otherwise: The imperative where nothing is similar.
+    """
+    similar = difflib.get_close_matches(word.lower(), list(choices), n=1, cutoff=0.5)
+    return f"perhaps '{similar[0]}' is meant" if similar else otherwise
+
+
+def _is_union_tag(part: str | int) -> bool:
+    """Pydantic puts the branch of a union ('float', 'constrained-str', 'literal[...]') into the location."""
+    return isinstance(part, str) and ("[" in part or part in {"float", "int", "str", "bool", "none"})
+
+
+def _explain_one(item: Any, location: tuple[str | int, ...], key: str, model: type[BaseModel], file: str) -> InputError:
+    kind: str = item["type"]
+    if kind == "missing":
+        allowed = _allowed(_field(model, location))
+        return InputError("is missing", file=file, key=key, allowed=allowed, mend="add it")
+    if kind == "extra_forbidden":
+        table = _model(model, location[:-1])
+        names = closest(str(location[-1]), table.model_fields if table else ())
+        return InputError(
+            "is not a known key",
+            file=file,
+            key=key,
+            allowed=", ".join(sorted(names)),
+            mend=suggestion(str(location[-1]), names, otherwise="delete it"),
+        )
+    field = _field(model, location)
+    allowed = _allowed(field)
+    value = item.get("input")
+    if isinstance(value, dict | list) and not (kind.startswith("too_") or kind.endswith("_short")):
+        value = f"a {'table' if isinstance(value, dict) else 'list'}"
+    if kind in {"literal_error", "string_pattern_mismatch"}:
+        problem, mend = "is not one of the choices" if kind == "literal_error" else "is misspelled", "choose one"
+        choices = _choices(field)
+        if choices and isinstance(value, str):
+            mend = suggestion(value, [str(choice) for choice in choices], otherwise="choose one")
+        elif kind != "literal_error":
+            mend = "use letters, digits and underscores"
+    elif kind.startswith(("greater_than", "less_than", "finite")):
+        problem, mend = "is out of range", "choose a value in this range"
+    elif kind.endswith(("_type", "_parsing", "_from_float")):
+        problem, mend = f"must be {_wanted(kind, field)}", "correct the value"
+    elif kind.startswith(("too_short", "string_too_short")):
+        problem, mend, value = "is empty", "add to it", None
+    else:
+        problem, mend = str(item["msg"]).lower().rstrip("."), "correct the value"
+    return InputError(problem, file=file, key=key, value=value, allowed=allowed, mend=mend)
+
+
+def _wanted(kind: str, field: FieldInfo | None) -> str:
+    if kind.startswith(("model", "dict")):
+        return "a table"
+    if kind.startswith("list"):
+        return "a list"
+    for annotation in _branches(field.annotation if field else None):
+        if annotation in _KINDS:
+            return _KINDS[annotation]
+    return "of another type"
+
+
+def _branches(annotation: Any) -> list[Any]:
+    """The plain types of an annotation, with unions and ``Annotated`` opened."""
+    origin = get_origin(annotation)
+    if origin in {Union, types.UnionType}:
+        return [branch for part in get_args(annotation) for branch in _branches(part)]
+    if hasattr(annotation, "__metadata__"):
+        return _branches(get_args(annotation)[0])
+    return [annotation]
+
+
+def _metadata(field: FieldInfo) -> list[Any]:
+    """Constraints of a field, also those inside an optional ``Annotated``."""
+    found = list(field.metadata)
+    for part in get_args(field.annotation):
+        for extra in getattr(part, "__metadata__", ()):
+            found.extend(extra.metadata if isinstance(extra, FieldInfo) else [extra])
+    return found
+
+
+def _choices(field: FieldInfo | None) -> tuple[Any, ...]:
+    if field is None:
+        return ()
+    return tuple(
+        choice for branch in _branches(field.annotation) if get_origin(branch) is Literal for choice in get_args(branch)
+    )
+
+
+def _allowed(field: FieldInfo | None) -> str | None:
+    """The allowed range or choices of a field, in words."""
+    if field is None:
+        return None
+    choices = _choices(field)
+    if choices:
+        return ", ".join(str(choice) for choice in choices)
+    low = high = None
+    above = False
+    for constraint in _metadata(field):
+        above = above or hasattr(constraint, "gt")
+        low = getattr(constraint, "ge", getattr(constraint, "gt", low))
+        high = getattr(constraint, "le", high)
+    if low is None or high is None:
+        return None
+    shown = f"{high:g}" if isinstance(high, float) else str(high)
+    return f"{'more than ' if above else ''}{low:g} {'and at most' if above else 'to'} {shown}"
+
+
+def _model(model: type[BaseModel] | None, location: tuple[str | int, ...]) -> type[BaseModel] | None:
+    """The table a location leads to."""
+    for part in location:
+        if isinstance(part, int) or model is None:
+            continue
+        field = model.model_fields.get(part)
+        model = _table_in(field.annotation) if field else None
+    return model
+
+
+def _table_in(annotation: Any) -> type[BaseModel] | None:
+    for branch in _branches(annotation):
+        if isinstance(branch, type) and issubclass(branch, BaseModel):
+            return branch
+        for inner in get_args(branch):
+            found = _table_in(inner)
+            if found is not None:
+                return found
+    return None
+
+
+def _field(model: type[BaseModel], location: tuple[str | int, ...]) -> FieldInfo | None:
+    """The field a location names; for an entry of a list, the list."""
+    names = [part for part in location if isinstance(part, str)]
+    if not names or isinstance(location[-1], int):
+        return None
+    table = _model(model, tuple(names[:-1]))
+    return table.model_fields.get(names[-1]) if table else None
