@@ -47,45 +47,81 @@ STICK_HALF_TRAVEL_IN = 4.8
 
 
 def kt(value: Quantity) -> Quantity:
-    """Airspeed in knots to m/s."""
+    """Airspeed in knots to m/s.
+
+    Args:
+        value: Airspeed [kn].
+    """
     return value * KNOT
 
 
 def to_kt(value: Quantity) -> Quantity:
-    """Airspeed in m/s to knots."""
+    """Airspeed in m/s to knots.
+
+    Args:
+        value: Airspeed [m/s].
+    """
     return value / KNOT
 
 
 def deg(value: Quantity) -> Quantity:
-    """Angle in degrees to radians."""
+    """Angle in degrees to radians.
+
+    Args:
+        value: Angle [deg].
+    """
     return value * DEGREE
 
 
 def to_deg(value: Quantity) -> Quantity:
-    """Angle in radians to degrees."""
+    """Angle in radians to degrees.
+
+    Args:
+        value: Angle [rad].
+    """
     return value / DEGREE
 
 
 def ft(value: Quantity) -> Quantity:
-    """Length in feet to metres."""
+    """Length in feet to metres.
+
+    Args:
+        value: Length [ft].
+    """
     return value * FOOT
 
 
 def to_ft(value: Quantity) -> Quantity:
-    """Length in metres to feet."""
+    """Length in metres to feet.
+
+    Args:
+        value: Length [m].
+    """
     return value / FOOT
 
 
 def lb(value: Quantity) -> Quantity:
-    """Mass in pounds to kilograms."""
+    """Mass in pounds to kilograms.
+
+    Args:
+        value: Mass [lb].
+    """
     return value * POUND
 
 
 def rpm(value: Quantity) -> Quantity:
-    """Rotational speed in revolutions per minute to rad/s."""
+    """Rotational speed in revolutions per minute to rad/s.
+
+    Args:
+        value: Rotational speed [rpm].
+    """
     return value * RPM
 
 
 def to_rpm(value: Quantity) -> Quantity:
-    """Rotational speed in rad/s to revolutions per minute."""
+    """Rotational speed in rad/s to revolutions per minute.
+
+    Args:
+        value: Rotational speed [rad/s].
+    """
     return value / RPM

@@ -166,7 +166,8 @@ def test_whole_conversion_by_the_switch_takes_about_as_long_as_the_paper_says():
         before = actuator.command_angle
         actuator.step(switch.step(pressed, command_angle=before, dt=DT), DT)
         # Let go and press again where a detent stops the run.
-        pressed = 0 if abs(actuator.command_angle - before) < 1e-9 else -1
+        stopped = abs(actuator.command_angle - before) < 1e-9
+        pressed = 0 if stopped and pressed else -1
         frames += 1
         assert frames < 10_000
     assert frames * DT == pytest.approx(12.0 + 2.5 / 1.96 + 2.5 / 2.73 - 5.0 / 7.5, abs=0.1)

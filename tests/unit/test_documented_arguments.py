@@ -1,0 +1,109 @@
+"""Every public object says what it is, and every argument of a public function has an entry under ``Args:``."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+
+import pytest
+
+import rtsim
+import scenarios
+import telemetry
+
+PACKAGES = (rtsim, telemetry, scenarios)
+
+
+def public_modules():
+    names = []
+    for package in PACKAGES:
+        names.append(package.__name__)
+        found = pkgutil.walk_packages(package.__path__, package.__name__ + ".")
+        names += [info.name for info in found if not any(piece.startswith("_") for piece in info.name.split("."))]
+    return names
+
+
+def unwrapped(obj):
+    """The Python function behind a compiled kernel or a decorated one."""
+    obj = getattr(obj, "py_func", obj)
+    if isinstance(obj, (staticmethod, classmethod)):
+        obj = obj.__func__
+    return inspect.unwrap(obj) if callable(obj) else obj
+
+
+def public_functions(module):
+    """Qualified name and function of everything public that the module itself defines."""
+    for name, member in vars(module).items():
+        if name.startswith("_"):
+            continue
+        if inspect.isclass(member) and member.__module__ == module.__name__:
+            for attribute, value in vars(member).items():
+                if not attribute.startswith("_") or attribute == "__init__":
+                    function = unwrapped(value)
+                    if inspect.isfunction(function) and function.__module__ == module.__name__:
+                        yield f"{name}.{attribute}", function
+        else:
+            function = unwrapped(member)
+            if inspect.isfunction(function) and function.__module__ == module.__name__:
+                yield name, function
+
+
+def public_classes(module):
+    for name, member in vars(module).items():
+        if not name.startswith("_") and inspect.isclass(member) and member.__module__ == module.__name__:
+            yield name, member
+
+
+def documented_arguments(docstring):
+    """Names that stand as ``name:`` at one indent under ``Args:``."""
+    text = inspect.cleandoc(docstring)
+    section = re.search(r"^Args:\n((?:[ ]+.*\n?|\n)*)", text, flags=re.MULTILINE)
+    if section is None:
+        return set()
+    return set(re.findall(r"^ {4}\*{0,2}(\w+)(?: \([^)]*\))?:", section.group(1), flags=re.MULTILINE))
+
+
+def faults_of(qualified_name, function):
+    arguments = [name for name in inspect.signature(function).parameters if name not in {"self", "cls"}]
+    is_init = qualified_name.endswith("__init__")
+    if is_init and (not arguments or (function.__doc__ is None and generated(function))):
+        return []
+    if not function.__doc__:
+        return [f"{qualified_name}: no docstring"]
+    documented = documented_arguments(function.__doc__)
+    missing = [f"{qualified_name}: argument {name} is not described" for name in arguments if name not in documented]
+    stale = [f"{qualified_name}: describes {name}, which it does not take" for name in documented - set(arguments)]
+    return missing + stale
+
+
+def generated(function):
+    """Whether a dataclass or NamedTuple wrote this ``__init__``; its fields are documented in the class."""
+    return function.__code__.co_filename.startswith("<")
+
+
+@pytest.mark.parametrize("name", public_modules())
+def test_public_objects_are_documented(name):
+    module = importlib.import_module(name)
+    faults = [] if module.__doc__ else [f"{name}: the module has no docstring"]
+    faults += [f"{class_name}: no docstring" for class_name, member in public_classes(module) if not member.__doc__]
+    for qualified_name, function in public_functions(module):
+        faults += faults_of(qualified_name, function)
+    assert faults == []
+
+
+def sample(first, second):
+    """Do something.
+
+    Args:
+        first: Described, with a colon: inside.
+        third: Not an argument.
+    """
+
+
+def test_an_undocumented_argument_would_be_found():
+    assert faults_of("sample", sample) == [
+        "sample: argument second is not described",
+        "sample: describes third, which it does not take",
+    ]
