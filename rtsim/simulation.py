@@ -1,0 +1,279 @@
+"""The closed loop as an object: reset, step, run, snapshot, restore. It knows no clock, no file and no socket."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rtsim import simulation_kernels as kernels
+from rtsim.aircraft.signals import INPUT, STATE
+from rtsim.command import Command, Margins, Reference, Sensors
+from rtsim.errors import InputError
+from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.programme import Programme
+from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
+from rtsim.units import DEGREE, INCH_POUND, KNOT
+
+PilotMode = Literal["mocm", "external", "hold"]
+MODES: dict[PilotMode, int] = {
+    "mocm": kernels.MODE_MOCM,
+    "external": kernels.MODE_EXTERNAL,
+    "hold": kernels.MODE_HOLD,
+}
+"""Pilot modes by name, with their number in the ``pilot_mode`` column."""
+END_REASONS = {
+    kernels.END_NONE: "",
+    kernels.END_GROUND: "the aircraft reached the ground",
+    kernels.END_ATTITUDE: "control was lost: pitch attitude beyond 80 deg",
+    kernels.END_NOT_FINITE: "the model diverged: a state is no longer a finite number",
+}
+"""Why a flight ended by itself, by the code in the simulation's clock."""
+
+__all__ = ["END_REASONS", "MODES", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All state of a simulation at the start of a frame."""
+
+    state: kernels.SimulationState
+    """Copies of every array the frame changes."""
+    random_stream: dict[str, object]
+    """State of the pilot-noise generator."""
+
+
+class Simulation:
+    """One aircraft, its pilot and its programme, advanced frame by frame.
+
+    The same compiled frame serves ``step`` and ``run``; both give the same numbers bit for bit.
+    """
+
+    def __init__(self, setup: FlightSetup) -> None:
+        """Load the parts and put the aircraft at the start.
+
+        Args:
+            setup: What flies, how and from where.
+
+        Raises:
+            InputError: The start has no trim or lies outside the database.
+        """
+        self.setup = setup
+        self._parts: Parts = build_parts(setup)
+        self.tables = self._parts.tables
+        self._state = start_state(setup, self._parts)
+        self._scratch = self._parts.scratch
+        self._noise_width = self._parts.noise_width
+        self._random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([setup.seed, 0])))
+        self._row = np.zeros(SIGNAL_COUNT)
+        self._command = np.zeros(3)
+        self._applied = np.zeros(3)
+        self._observed = False
+        self._noise = np.zeros(self._noise_width)
+
+    @property
+    def dt(self) -> float:
+        """Length of a frame [s]."""
+        return self.tables.dt
+
+    @property
+    def frame_index(self) -> int:
+        """Number of the frame that starts now."""
+        return int(self._state.clock[kernels.CLOCK_FRAME])
+
+    @property
+    def time(self) -> float:
+        """Time at the start of this frame, frame * dt [s]."""
+        return self.frame_index * self.tables.dt
+
+    @property
+    def finished(self) -> bool:
+        """The flight ended by itself; ``end_reason`` says why."""
+        return self._state.clock[kernels.CLOCK_END] != kernels.END_NONE
+
+    @property
+    def end_reason(self) -> str:
+        """Why the flight ended by itself; empty while it has not."""
+        return END_REASONS[int(self._state.clock[kernels.CLOCK_END])]
+
+    @property
+    def mode(self) -> PilotMode:
+        """Who flies."""
+        number = int(self._state.clock[kernels.CLOCK_MODE])
+        return next(name for name, value in MODES.items() if value == number)
+
+    @property
+    def database_hash(self) -> str:
+        """Content hash of the LPV database in use."""
+        return self._parts.database_hash
+
+    @property
+    def outside_grid(self) -> int:
+        """Flags of the last LPV step: 0 inside the grid, else bits as in ``rtsim.lpv.lpv_kernels``."""
+        return int(self._state.clock[kernels.CLOCK_FLAGS])
+
+    def warm_up(self) -> None:
+        """Compile or load every kernel of the frame; the state stays untouched."""
+        snapshot = self.snapshot()
+        self.step()
+        self.step(Command(0.0, 0.5, 0.0))
+        self.set_pilot("external")
+        self.set_pilot("mocm")
+        self.run(2)
+        self.restore(snapshot)
+
+    def reset(self) -> None:
+        """Go back to frame 0, random stream included."""
+        fresh = start_state(self.setup, self._parts)
+        for mine, start in zip(self._state, fresh, strict=True):
+            mine[:] = start
+        self._random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.setup.seed, 0])))
+        self._observed = False
+
+    def sensors(self) -> Sensors:
+        """The aircraft at the start of this frame as pilots and laws may know it."""
+        row = self._observe()
+        x = self._state.x
+        return Sensors(
+            time=float(row[COLUMN.time_s]),
+            airspeed=float(row[COLUMN.airspeed_kt]) * KNOT,
+            airspeed_rate=float(row[COLUMN.airspeed_rate_kt_s]) * KNOT,
+            nacelle_angle=float(self._scratch.motion[0]),
+            nacelle_rate=float(self._scratch.motion[1]),
+            pitch=float(x[STATE.pitch]),
+            pitch_rate=float(x[STATE.q]),
+            flight_path_angle=float(row[COLUMN.flight_path_deg]) * DEGREE,
+            altitude=float(x[STATE.altitude]),
+            climb_rate=float(row[COLUMN.climb_rate_m_s]),
+            load_factor=float(row[COLUMN.load_factor]),
+            mast_torque=float(row[COLUMN.mast_torque_inlb]) * INCH_POUND,
+            flapping=float(row[COLUMN.flapping_deg]) * DEGREE,
+            on_downstop=bool(row[COLUMN.on_downstop]),
+            nacelle_ok=True,
+        )
+
+    def reference(self) -> Reference:
+        """What the programme asks for in this frame."""
+        self._observe()
+        target = self._scratch.target
+        wanted = self.setup.programme.at(self.time)
+        return Reference(
+            airspeed=float(target[0]),
+            airspeed_rate=float(target[1]),
+            nacelle_angle=wanted.nacelle_angle,
+            nacelle_rate=float(target[4]),
+            altitude=float(target[2]),
+        )
+
+    def margins(self) -> Margins:
+        """Distances to the corridor boundaries at the start of this frame."""
+        self._observe()
+        low, high, forward, aft = (float(value) for value in self._scratch.margins)
+        return Margins(low=low, high=high, nacelle_forward=forward, nacelle_aft=aft)
+
+    def pilot_command(self) -> Command:
+        """The built-in MOCM's command for the frame that starts now; changes nothing."""
+        self._observe()
+        kernels.pilot_command(self.tables, self._state, self._scratch, self._noise, self._command)
+        stick, lever, rate = (float(value) for value in self._command)
+        return Command(stick, lever, rate)
+
+    def step(self, command: Command | None = None, *, applied: Command | None = None) -> FloatArray:
+        """Fly one frame.
+
+        Args:
+            command: The pilot's output; None: the built-in MOCM, or the held command in mode ``hold``.
+            applied: The command after protection; None: the pilot's own.
+
+        Returns:
+            The frame's row, shape (SIGNAL_COUNT,), a new array.
+        """
+        self._observe()
+        if command is not None:
+            self._command[:] = command.stick, command.lever, command.nacelle_rate
+        elif self.mode == "mocm":
+            kernels.pilot_command(self.tables, self._state, self._scratch, self._noise, self._command)
+        else:
+            self._command[:] = self._state.u[INPUT.stick], self._state.u[INPUT.lever], 0.0
+        if applied is None:
+            self._applied[:] = self._command
+        else:
+            self._applied[:] = applied.stick, applied.lever, applied.nacelle_rate
+        if not (np.isfinite(self._command).all() and np.isfinite(self._applied).all()):
+            raise InputError(
+                "the command is not a finite number",
+                key="command",
+                value=tuple(float(v) for v in self._applied),
+                mend="give stick, lever and nacelle rate as finite numbers",
+            )
+        kernels.advance(
+            self.tables, self._state, self._scratch, self._row, (self._command, self._applied, self._noise)
+        )
+        self._observed = False
+        return self._row.copy()
+
+    def run(self, frames: int) -> FloatArray:
+        """Fly frames in one compiled call with built-in parts only.
+
+        Args:
+            frames: How many; fewer are flown if the flight ends by itself.
+
+        Returns:
+            The rows, shape (frames flown, SIGNAL_COUNT).
+        """
+        rows = np.zeros((frames, SIGNAL_COUNT))
+        noise = np.zeros((frames, self._noise_width))
+        if self._noise_width and frames:
+            # The noise of an already observed frame is drawn; the rest follows in the same order as by step.
+            first = 1 if self._observed else 0
+            if first:
+                noise[0] = self._noise
+            noise[first:] = self._random.standard_normal((frames - first, self._noise_width))
+        flown = int(kernels.run_frames(self.tables, self._state, self._scratch, noise, rows))
+        if frames:
+            self._observed = False
+        return rows[:flown]
+
+    def set_pilot(self, mode: PilotMode, *, command: Command | None = None) -> None:
+        """Hand the controls over from this frame on; the MOCM picks up without a step of the controls.
+
+        Args:
+            mode: ``mocm``, ``external`` (the caller gives commands) or ``hold`` (controls stay where they are).
+            command: Controls to hold from now on; None: those that acted last.
+        """
+        if command is not None:
+            self._state.u[INPUT.stick], self._state.u[INPUT.lever] = command.stick, command.lever
+        if mode == "mocm" and self.mode != "mocm":
+            self._observe()
+            kernels.engage_pilot(self.tables, self._state, self._scratch)
+        self._state.clock[kernels.CLOCK_MODE] = MODES[mode]
+        if self._observed:
+            self._row[COLUMN.pilot_mode] = MODES[mode]
+
+    def snapshot(self) -> Snapshot:
+        """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""
+        self._observe()
+        noise_state = {"generator": self._random.bit_generator.state, "drawn": self._noise.copy()}
+        return Snapshot(kernels.SimulationState(*(array.copy() for array in self._state)), noise_state)
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go back to a snapshot; what follows is bit-equal to what followed it the first time.
+
+        Args:
+            snapshot: From ``snapshot`` of a simulation with the same setup.
+        """
+        for mine, saved in zip(self._state, snapshot.state, strict=True):
+            mine[:] = saved
+        self._random.bit_generator.state = snapshot.random_stream["generator"]
+        self._noise[:] = np.asarray(snapshot.random_stream["drawn"])
+        kernels.observe(self.tables, self._state, self._scratch, self._row)
+        self._observed = True
+
+    def _observe(self) -> FloatArray:
+        if not self._observed:
+            if self._noise_width:
+                self._noise[:] = self._random.standard_normal(self._noise_width)
+            kernels.observe(self.tables, self._state, self._scratch, self._row)
+            self._observed = True
+        return self._row

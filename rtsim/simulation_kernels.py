@@ -1,0 +1,386 @@
+"""One frame of the closed loop, compiled: observe, command, record, advance.
+
+``observe`` fills what can be known at the start of a frame, ``pilot_command`` asks the built-in MOCM, ``advance`` records
+the command and moves everything to the next frame. ``run_frames`` is the same three calls in a compiled loop, so that a
+flight stepped from Python and one run in a batch are equal bit for bit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from rtsim.aircraft import dynamics_kernels as nonlinear
+from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
+from rtsim.aircraft.tables import AircraftTables
+from rtsim.corridor.corridor_kernels import CorridorTables, corridor_level_step, corridor_margins
+from rtsim.frame import COLUMN
+from rtsim.lpv.lpv_kernels import LpvTables, lpv_outputs, lpv_step
+from rtsim.nacelle.nacelle_kernels import (
+    NacelleTables,
+    nacelle_advance,
+    nacelle_assigned_rate,
+    nacelle_at,
+    nacelle_effective_rate,
+    nacelle_path,
+    on_downstop,
+)
+from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance, mocm_engage, mocm_output
+from rtsim.ramp_filter_kernels import critically_damped_ramp
+from rtsim.units import (
+    DEGREE,
+    HORSEPOWER,
+    INCH_POUND,
+    KNOT,
+    POUND_FORCE,
+    RPM,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+PLANT_LPV, PLANT_NONLINEAR = 0, 1
+MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
+
+# Places in SimulationState.clock.
+CLOCK_FRAME, CLOCK_MODE, CLOCK_DISTANCE, CLOCK_FLAGS, CLOCK_END = 0, 1, 2, 3, 4
+CLOCK_SIZE = 5
+# Places in SimulationState.reference: unfiltered airspeed command is a function of time and not kept.
+REFERENCE_AIRSPEED, REFERENCE_RATE = 0, 1
+REFERENCE_SIZE = 2
+# Why a flight ended by itself.
+END_NONE, END_GROUND, END_ATTITUDE, END_NOT_FINITE = 0, 1, 2, 3
+LARGEST_PITCH = 80.0 * DEGREE
+TRANSMISSION_EFFICIENCY = 0.93
+# The array handed to the pilot, see rtsim.pilot.pilot_kernels.
+TARGET_SIZE = 5
+
+
+class SimulationTables(NamedTuple):
+    """Everything the frame reads and never writes."""
+
+    plant: int
+    """PLANT_LPV or PLANT_NONLINEAR."""
+    dt: float
+    """Length of a frame [s]."""
+    wind: float
+    """Tailwind [m/s]."""
+    lpv: LpvTables
+    """The LPV aircraft."""
+    aircraft: AircraftTables
+    """The nonlinear aircraft."""
+    nacelle: NacelleTables
+    """Conversion actuator."""
+    corridor: CorridorTables
+    """Boundaries and levels."""
+    pilot: PilotTables
+    """The MOCM's gains and references."""
+    programme: FloatArray
+    """Rows: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
+    reference_frequency: float
+    """Natural frequency of the critically damped airspeed reference filter [rad/s]."""
+
+
+class SimulationState(NamedTuple):
+    """Everything the frame changes; a snapshot is a copy of these arrays and of the random stream."""
+
+    x: FloatArray
+    """Aircraft state."""
+    u: FloatArray
+    """Inputs that acted last."""
+    nacelle: FloatArray
+    """Actuator: command angle, angle, rate."""
+    reference: FloatArray
+    """Filtered airspeed reference and its rate."""
+    level: FloatArray
+    """Corridor level timers."""
+    pilot: FloatArray
+    """State of the MOCM."""
+    clock: FloatArray
+    """Frame number, pilot mode, distance flown [m], LPV flags, end code."""
+
+
+class Scratch(NamedTuple):
+    """Work space; holds nothing from one frame to the next."""
+
+    work: FloatArray
+    """Work array of the plant kernels."""
+    y: FloatArray
+    """Plant outputs."""
+    xdot: FloatArray
+    """Plant state derivative."""
+    path: FloatArray
+    """Nacelle motion over the frame, shape (3, 3)."""
+    motion: FloatArray
+    """Nacelle angle, rate, acceleration now."""
+    margins: FloatArray
+    """Corridor margins."""
+    target: FloatArray
+    """What the pilot is asked for."""
+    command: FloatArray
+    """Stick, lever, nacelle rate."""
+
+
+@numba.njit(cache=True, error_model="numpy")
+def programme_at(programme: FloatArray, row: int, time: float) -> float:
+    """Value of one row of the programme, linear between its points and held after the last.
+
+    Args:
+        programme: The programme's points, shape (4, points).
+        row: 1 airspeed, 2 nacelle angle, 3 altitude.
+        time: Time [s].
+    """
+    last = programme.shape[1] - 1
+    if time >= programme[0, last]:
+        return programme[row, last]
+    low = 0
+    high = last
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if programme[0, middle] <= time:
+            low = middle
+        else:
+            high = middle
+    if last == 0:
+        return programme[row, 0]
+    share = (time - programme[0, low]) / (programme[0, high] - programme[0, low])
+    return programme[row, low] + share * (programme[row, high] - programme[row, low])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
+    """Fill the row with all that is known before the command of this frame; changes no state.
+
+    Args:
+        tables: The simulation.
+        state: Its state at the start of the frame.
+        scratch: Work space; afterwards holds outputs, margins and the pilot's target.
+        row: Written: the frame row, commands excepted.
+    """
+    x = state.x
+    frame = state.clock[CLOCK_FRAME]
+    time = frame * tables.dt
+    nacelle_at(tables.nacelle, state.nacelle, 0.0, 0.0, scratch.motion)
+    angle, rate = scratch.motion[0], scratch.motion[1]
+    state.u[INPUT.nacelle_rate] = rate
+    state.u[INPUT.nacelle_acceleration] = scratch.motion[2]
+    if tables.plant == PLANT_LPV:
+        lpv_outputs(tables.lpv, x, state.u, angle, scratch.y, scratch.work)
+    else:
+        nonlinear.outputs(tables.aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
+    st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
+    airspeed = x[STATE.u] * ct + x[STATE.w] * st
+    climb = x[STATE.u] * st - x[STATE.w] * ct
+    corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
+    y = scratch.y
+    rotor_speed = tables.aircraft.configuration.rotor_speed
+    power = 2.0 * y[OUTPUT.torque] * rotor_speed
+
+    target = scratch.target
+    target[0] = state.reference[REFERENCE_AIRSPEED]
+    target[1] = state.reference[REFERENCE_RATE]
+    target[2] = programme_at(tables.programme, 3, time)
+    ahead = programme_at(tables.programme, 3, time + tables.dt)
+    target[3] = (ahead - target[2]) / tables.dt
+    wanted = programme_at(tables.programme, 2, time + tables.dt)
+    target[4] = nacelle_assigned_rate(tables.nacelle, (wanted - state.nacelle[0]) / tables.dt)
+
+    row[COLUMN.frame] = frame
+    row[COLUMN.time_s] = time
+    row[COLUMN.airspeed_kt] = airspeed / KNOT
+    row[COLUMN.airspeed_reference_kt] = target[0] / KNOT
+    row[COLUMN.nacelle_deg] = angle / DEGREE
+    row[COLUMN.nacelle_reference_deg] = state.nacelle[0] / DEGREE
+    row[COLUMN.altitude_m] = x[STATE.altitude]
+    row[COLUMN.pitch_deg] = x[STATE.pitch] / DEGREE
+    row[COLUMN.flapping_deg] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2) / DEGREE
+    row[COLUMN.nacelle_rate_deg_s] = rate / DEGREE
+    row[COLUMN.airspeed_command_kt] = programme_at(tables.programme, 1, time) / KNOT
+    row[COLUMN.altitude_reference_m] = target[2]
+    row[COLUMN.airspeed_rate_kt_s] = y[OUTPUT.airspeed_rate] / KNOT
+    row[COLUMN.ground_speed_kt] = (airspeed + tables.wind) / KNOT
+    row[COLUMN.climb_rate_m_s] = climb
+    row[COLUMN.distance_m] = state.clock[CLOCK_DISTANCE]
+    row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(airspeed), 1.0)) / DEGREE
+    row[COLUMN.angle_of_attack_deg] = math.atan2(x[STATE.w] + 4.5 * st, x[STATE.u] + 4.5 * ct) / DEGREE
+    row[COLUMN.pitch_rate_deg_s] = x[STATE.q] / DEGREE
+    row[COLUMN.body_u_m_s] = x[STATE.u]
+    row[COLUMN.body_w_m_s] = x[STATE.w]
+    row[COLUMN.load_factor] = y[OUTPUT.load_factor]
+    row[COLUMN.coning_deg] = x[STATE.coning] / DEGREE
+    row[COLUMN.longitudinal_flapping_deg] = x[STATE.flap_1c] / DEGREE
+    row[COLUMN.lateral_flapping_deg] = x[STATE.flap_1s] / DEGREE
+    row[COLUMN.collective_75_deg] = x[STATE.collective_75] / DEGREE
+    row[COLUMN.cyclic_deg] = x[STATE.cyclic_1s] / DEGREE
+    row[COLUMN.elevator_deg] = x[STATE.elevator] / DEGREE
+    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2)
+    row[COLUMN.flap_deg] = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle) / DEGREE
+    row[COLUMN.thrust_per_rotor_lb] = y[OUTPUT.thrust] / POUND_FORCE
+    row[COLUMN.power_shp] = power / HORSEPOWER
+    row[COLUMN.engine_power_shp] = power / HORSEPOWER / TRANSMISSION_EFFICIENCY
+    row[COLUMN.mast_torque_inlb] = y[OUTPUT.torque] / INCH_POUND
+    row[COLUMN.rotor_speed_rpm] = rotor_speed / RPM
+    row[COLUMN.margin_kt] = min(scratch.margins[0], scratch.margins[1]) / KNOT
+    row[COLUMN.margin_low_kt] = scratch.margins[0] / KNOT
+    row[COLUMN.margin_high_kt] = scratch.margins[1] / KNOT
+    row[COLUMN.nacelle_forward_deg] = scratch.margins[2] / DEGREE
+    row[COLUMN.nacelle_aft_deg] = scratch.margins[3] / DEGREE
+    row[COLUMN.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
+    row[COLUMN.pilot_mode] = state.clock[CLOCK_MODE]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def pilot_command(
+    tables: SimulationTables, state: SimulationState, scratch: Scratch, noise: FloatArray, out: FloatArray
+) -> None:
+    """The built-in MOCM's command for the frame just observed; changes no state.
+
+    Args:
+        tables: The simulation.
+        state: Its state at the start of the frame.
+        scratch: Work space as ``observe`` left it.
+        noise: Standard normals of this frame; empty where the noise is off.
+        out: Written: stick, lever, nacelle rate [rad/s].
+    """
+    mocm_output(
+        tables.pilot, state.pilot, state.x, scratch.motion[0], scratch.motion[1], scratch.target, noise, scratch.command
+    )
+    out[0] = scratch.command[0]
+    out[1] = scratch.command[1]
+    out[2] = scratch.target[4]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def advance(
+    tables: SimulationTables,
+    state: SimulationState,
+    scratch: Scratch,
+    row: FloatArray,
+    commands: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Record the command and move the whole simulation to the start of the next frame.
+
+    Args:
+        tables: The simulation.
+        state: Its state, updated in place.
+        scratch: Work space as ``observe`` left it.
+        row: The frame row, completed.
+        commands: The pilot's command, the command that acts, and this frame's standard normals.
+    """
+    asked, applied, noise = commands
+    dt = tables.dt
+    x, u = state.x, state.u
+    angle = scratch.motion[0]
+    stick = min(max(applied[0], -1.0), 1.0)
+    lever = min(max(applied[1], 0.0), 1.0)
+    rate = nacelle_effective_rate(tables.nacelle, state.nacelle, nacelle_assigned_rate(tables.nacelle, applied[2]), dt)
+    margin = min(scratch.margins[0], scratch.margins[1])
+    controls = tables.aircraft.controls
+    cyclic_stop = abs(x[STATE.cyclic_1s]) >= controls.cyclic_limit * (1.0 - 1e-9)
+    elevator_stop = abs(x[STATE.elevator]) >= controls.elevator_limit * (1.0 - 1e-9)
+    stick_stop = abs(applied[0]) >= 1.0
+    lever_stop = applied[1] <= 0.0 or applied[1] >= 1.0
+    row[COLUMN.stick] = stick
+    row[COLUMN.lever] = lever
+    row[COLUMN.pilot_stick] = asked[0]
+    row[COLUMN.pilot_lever] = asked[1]
+    row[COLUMN.pilot_nacelle_rate_deg_s] = asked[2] / DEGREE
+    row[COLUMN.nacelle_command_rate_deg_s] = rate / DEGREE
+    row[COLUMN.corridor_level] = float(corridor_level_step(tables.corridor, margin, dt, state.level))
+    row[COLUMN.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
+
+    scratch.command[0] = stick
+    scratch.command[1] = lever
+    if state.clock[CLOCK_MODE] == MODE_MOCM:
+        mocm_advance(
+            tables.pilot,
+            state.pilot,
+            x,
+            angle,
+            scratch.motion[1],
+            scratch.target,
+            scratch.command,
+            noise,
+            dt,
+        )
+    nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
+    u[INPUT.stick] = stick
+    u[INPUT.lever] = lever
+    before = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
+    if tables.plant == PLANT_LPV:
+        lpv_step(tables.lpv, x, u, scratch.path, dt, scratch.work)
+        state.clock[CLOCK_FLAGS] = scratch.work[0]
+    else:
+        nonlinear.step(tables.aircraft, x, u, scratch.path, dt, scratch.work)
+    after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
+    state.clock[CLOCK_DISTANCE] += dt * (0.5 * (before + after) + tables.wind)
+    nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
+
+    time = state.clock[CLOCK_FRAME] * dt
+    wanted = programme_at(tables.programme, 1, time)
+    slope = (programme_at(tables.programme, 1, time + dt) - wanted) / dt
+    value, value_rate, _ = critically_damped_ramp(
+        tables.reference_frequency, wanted, slope, state.reference[0], state.reference[1], dt
+    )
+    state.reference[0] = value
+    state.reference[1] = value_rate
+    state.clock[CLOCK_FRAME] += 1.0
+    finite = True
+    for i in range(x.shape[0]):
+        finite = finite and math.isfinite(x[i])
+    if not finite:
+        state.clock[CLOCK_END] = END_NOT_FINITE
+    elif x[STATE.altitude] < 0.0:
+        state.clock[CLOCK_END] = END_GROUND
+    elif abs(x[STATE.pitch]) > LARGEST_PITCH:
+        state.clock[CLOCK_END] = END_ATTITUDE
+
+
+@numba.njit(cache=True, error_model="numpy")
+def run_frames(
+    tables: SimulationTables, state: SimulationState, scratch: Scratch, noise: FloatArray, rows: FloatArray
+) -> int:
+    """Fly frames with the built-in pilot (or the held command) until the rows are full or the flight ends.
+
+    Args:
+        tables: The simulation.
+        state: Its state, updated in place.
+        scratch: Work space.
+        noise: Standard normals, one row per frame; shape (frames, 0) where the noise is off.
+        rows: Written: the frame rows, shape (frames, signals).
+
+    Returns:
+        The number of frames flown.
+    """
+    command = np.empty(3)
+    for k in range(rows.shape[0]):
+        if state.clock[CLOCK_END] != END_NONE:
+            return k
+        observe(tables, state, scratch, rows[k])
+        if state.clock[CLOCK_MODE] == MODE_MOCM:
+            pilot_command(tables, state, scratch, noise[k], command)
+        else:
+            command[0] = state.u[INPUT.stick]
+            command[1] = state.u[INPUT.lever]
+            command[2] = 0.0
+        advance(tables, state, scratch, rows[k], (command, command, noise[k]))
+    return rows.shape[0]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def engage_pilot(tables: SimulationTables, state: SimulationState, scratch: Scratch) -> None:
+    """Let the MOCM take the controls as they are: its state is set so that its first output equals them.
+
+    Args:
+        tables: The simulation.
+        state: Its state; the pilot's part is overwritten.
+        scratch: Work space as ``observe`` left it.
+    """
+    scratch.command[0] = state.u[INPUT.stick]
+    scratch.command[1] = state.u[INPUT.lever]
+    mocm_engage(
+        tables.pilot, state.pilot, state.x, scratch.motion[0], scratch.motion[1], scratch.target, scratch.command
+    )

@@ -1,0 +1,177 @@
+"""What a flight is set up with, and the tables and start state that follow from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from rtsim import simulation_kernels as kernels
+from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
+from rtsim.aircraft import dynamics_kernels as nonlinear
+from rtsim.corridor import load_corridor
+from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
+from rtsim.errors import InputError
+from rtsim.frame import FloatArray
+from rtsim.lpv.aircraft import load_aircraft
+from rtsim.lpv.lpv_kernels import work_size
+from rtsim.lpv.tables import Form, prepare_tables
+from rtsim.nacelle import load_nacelle_tables
+from rtsim.nacelle.nacelle_kernels import new_actuator_state
+from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
+from rtsim.programme import Programme
+from rtsim.units import to_deg, to_kt
+
+Plant = Literal["lpv", "lpv-plain", "nonlinear"]
+PLANT_FORMS: dict[Plant, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
+REFERENCE_FREQUENCY = 1.5
+"""Natural frequency of the airspeed reference filter [rad/s] (design.md)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightSetup:
+    """What flies, how and from where. SI and radians."""
+
+    programme: Programme
+    """Airspeed, nacelle angle and altitude over time."""
+    plant: Plant = "lpv"
+    """``lpv`` (three scheduling variables), ``lpv-plain`` (the paper's form) or ``nonlinear``."""
+    outer_loop: Literal["integrators", "pi"] = "integrators"
+    """How the MOCM holds airspeed and altitude."""
+    pilot: Literal["mocm", "external"] = "mocm"
+    """Who flies at frame 0."""
+    corridor: Literal["design", "flight"] = "design"
+    """Boundaries to watch."""
+    rate_hz: int = 250
+    """Frames per second."""
+    start_airspeed: float | None = None
+    """Airspeed at frame 0 [m/s]; None: the programme's first."""
+    start_nacelle: float | None = None
+    """Nacelle angle at frame 0 [rad]; None: the programme's first."""
+    start_altitude: float | None = None
+    """Altitude at frame 0 [m]; None: the programme's first."""
+    wind: float = 0.0
+    """Steady tailwind [m/s]."""
+    seed: int = 0
+    """Root of every random stream."""
+    pilot_noise: bool = False
+    """Let the MOCM's observation and motor noise act."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Tables and work space of one simulation."""
+
+    tables: kernels.SimulationTables
+    """Parameters of the frame."""
+    scratch: kernels.Scratch
+    """Work space of the frame."""
+    noise_width: int
+    """Standard normals the pilot takes per frame; 0 with the noise off."""
+    database_hash: str
+    """Content hash of the database."""
+    start_x: FloatArray = field(repr=False)
+    """Trimmed state at the start."""
+    start_u: FloatArray = field(repr=False)
+    """Trimmed inputs at the start."""
+
+
+def _start(setup: FlightSetup) -> tuple[float, float, float]:
+    first = setup.programme.at(0.0)
+    airspeed = first.airspeed if setup.start_airspeed is None else setup.start_airspeed
+    nacelle = first.nacelle_angle if setup.start_nacelle is None else setup.start_nacelle
+    altitude = first.altitude if setup.start_altitude is None else setup.start_altitude
+    return airspeed, nacelle, altitude
+
+
+def build_parts(setup: FlightSetup) -> Parts:
+    """Load database, gains and corridor, and trim at the start.
+
+    Args:
+        setup: The flight.
+
+    Raises:
+        InputError: The start has no trim.
+    """
+    lpv_aircraft = load_aircraft()
+    database = lpv_aircraft.database
+    nonlinear_aircraft = Xv15.load()
+    airspeed, nacelle, altitude = _start(setup)
+    if setup.plant == "nonlinear":
+        trim = nonlinear_aircraft.trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
+        converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
+    else:
+        point = lpv_aircraft.trim(airspeed=airspeed, nacelle=nacelle)
+        converged, x, u = point.converged, point.x.copy(), point.u.copy()
+    if not converged:
+        raise InputError(
+            "the aircraft has no level-flight trim there",
+            key="start",
+            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
+            mend="start inside the conversion corridor (rtsim corridor shows it)",
+        )
+    x[STATE.altitude] = altitude
+    programme = setup.programme
+    tables = kernels.SimulationTables(
+        plant=kernels.PLANT_NONLINEAR if setup.plant == "nonlinear" else kernels.PLANT_LPV,
+        dt=1.0 / setup.rate_hz,
+        wind=float(setup.wind),
+        lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
+        aircraft=nonlinear_aircraft.tables,
+        nacelle=load_nacelle_tables(),
+        corridor=load_corridor(setup.corridor).tables(),
+        pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
+        programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
+        reference_frequency=REFERENCE_FREQUENCY,
+    )
+    states = len(STATES)
+    work = max(work_size(tables.lpv), nonlinear.WORK_COUNT + 6 * states)
+    scratch = kernels.Scratch(
+        work=np.zeros(work),
+        y=np.zeros(len(OUTPUTS)),
+        xdot=np.zeros(states),
+        path=np.zeros((3, 3)),
+        motion=np.zeros(3),
+        margins=np.zeros(MARGIN_COUNT),
+        target=np.zeros(kernels.TARGET_SIZE),
+        command=np.zeros(3),
+    )
+    return Parts(
+        tables=tables,
+        scratch=scratch,
+        noise_width=noise_width(tables.pilot) if setup.pilot_noise else 0,
+        database_hash=database.content_hash,
+        start_x=x,
+        start_u=u,
+    )
+
+
+def start_state(setup: FlightSetup, parts: Parts) -> kernels.SimulationState:
+    """The state at frame 0: trimmed, filters at rest, the pilot engaged without a step.
+
+    Args:
+        setup: The flight.
+        parts: Its parts.
+    """
+    airspeed, nacelle, _ = _start(setup)
+    clock = np.zeros(kernels.CLOCK_SIZE)
+    clock[kernels.CLOCK_MODE] = kernels.MODE_MOCM if setup.pilot == "mocm" else kernels.MODE_EXTERNAL
+    u = parts.start_u.copy()
+    u[INPUT.nacelle_rate :] = 0.0
+    state = kernels.SimulationState(
+        x=parts.start_x.copy(),
+        u=u,
+        nacelle=new_actuator_state(nacelle),
+        reference=np.array([airspeed, 0.0]),
+        level=new_level_state(),
+        pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
+        clock=clock,
+    )
+    row = np.zeros(len(kernels.COLUMN))
+    kernels.observe(parts.tables, state, parts.scratch, row)
+    kernels.engage_pilot(parts.tables, state, parts.scratch)
+    return state
+
+
+__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "start_state"]
