@@ -1,0 +1,319 @@
+"""The LPV database in memory: trim map, linear models and pilot gains on a grid, read-only and checked.
+
+Leading axes of every array are [layer, airspeed, nacelle]: the layers are trims at different level accelerations.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from rtsim.errors import InputError
+from rtsim.lpv.variables import SCHEDULING_STATES, Variable, position
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+GRIDDED: Final = ("x_ref", "u_ref", "y_ref", "xdot_ref", "A", "B", "C", "D", "df_dnacelle", "valid")
+"""Arrays with the leading axes [layer, airspeed, nacelle]."""
+AXES: Final = ("layer_acceleration", "airspeed", "nacelle")
+"""The three axes, in the order of the arrays."""
+JACOBIAN_BITS: Final = 20
+"""Bits kept of the mantissa of derivatives (6 significant digits); trims are kept in full."""
+
+
+@dataclass(frozen=True, slots=True)
+class PilotArrays:
+    """The gains of one pilot design, stored with the database they were designed for."""
+
+    arrays: Mapping[str, FloatArray]
+    """Named arrays."""
+    attributes: Mapping[str, str | float | int] = field(default_factory=dict)
+    """What people and the loader need to know of the design (weights, versions)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Database:
+    """Trim map and linear models of one aircraft in one condition. SI and radians throughout."""
+
+    layer_acceleration: FloatArray
+    """Level acceleration of each layer (L,) [m/s^2], ascending; contains 0."""
+    airspeed: FloatArray
+    """Horizontal airspeed, signed (V,) [m/s], ascending."""
+    nacelle: FloatArray
+    """Nacelle angle (N,) [rad], ascending; pi/2 helicopter."""
+    x_ref: FloatArray
+    """Trim state [..., nx]; altitude entry 0."""
+    u_ref: FloatArray
+    """Trim input [..., nu]; nacelle rate, acceleration and gusts 0."""
+    y_ref: FloatArray
+    """Trim output [..., ny]."""
+    xdot_ref: FloatArray
+    """State derivative at the trim [..., nx]: 0 on the level layer, the steady acceleration on the others."""
+    A: FloatArray
+    """Derivative of the state derivative with the state [..., nx, nx], gravity and kinematics included."""
+    B: FloatArray
+    """Derivative of the state derivative with the input [..., nx, nu]."""
+    C: FloatArray
+    """Derivative of the output with the state [..., ny, nx]."""
+    D: FloatArray
+    """Derivative of the output with the input [..., ny, nu]."""
+    df_dnacelle: FloatArray
+    """Derivative of the state derivative with the nacelle angle [..., nx]."""
+    valid: BoolArray
+    """Whether a trim exists here [...]; where not, the cell holds the nearest valid airspeed's models."""
+    flap: FloatArray
+    """Flap deflection of the flap schedule (V, N) [rad]."""
+    rotor_speed: float
+    """Rotor speed, held [rad/s]."""
+    states: tuple[Variable, ...]
+    """The nx states."""
+    inputs: tuple[Variable, ...]
+    """The nu inputs."""
+    outputs: tuple[Variable, ...]
+    """The ny outputs."""
+    attributes: Mapping[str, str | float | int] = field(default_factory=dict)
+    """Title, condition (weight, density), versions, hash of the aircraft data."""
+    pilot: Mapping[str, PilotArrays] = field(default_factory=dict)
+    """Pilot gains by name of the design."""
+
+    def __post_init__(self) -> None:
+        """Make every array read-only, contiguous float64 and check shapes and axes."""
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                kind = np.bool_ if item.name == "valid" else np.float64
+                array = np.ascontiguousarray(value, dtype=kind)
+                if array is value and array.flags.writeable:
+                    array = array.copy()
+                array.setflags(write=False)
+                object.__setattr__(self, item.name, array)
+        check_database(self)
+
+    @property
+    def level_layer(self) -> int:
+        """Number of the layer of zero acceleration."""
+        return int(np.argmin(np.abs(self.layer_acceleration)))
+
+    @property
+    def content_hash(self) -> str:
+        """SHA-256 over names, units and every number, pilot gains included: the *database hash*."""
+        digest = hashlib.sha256()
+        for kind in (self.states, self.inputs, self.outputs):
+            for variable in kind:
+                digest.update(f"{variable.name}[{variable.unit}];".encode())
+            digest.update(b"|")
+        for name in (*AXES, *GRIDDED, "flap"):
+            _update(digest, name, getattr(self, name))
+        _update(digest, "rotor_speed", np.array(self.rotor_speed))
+        for design in sorted(self.pilot):
+            for name in sorted(self.pilot[design].arrays):
+                _update(digest, f"pilot/{design}/{name}", self.pilot[design].arrays[name])
+        return digest.hexdigest()
+
+    def with_pilot(self, design: str, pilot: PilotArrays) -> Database:
+        """Give a copy that carries the gains of one more pilot design.
+
+        Args:
+            design: Name of the design; an existing one is replaced.
+            pilot: Its arrays and attributes.
+
+        Returns:
+            The new database.
+        """
+        return replace(self, pilot={**self.pilot, design: pilot})
+
+
+def _update(digest: hashlib._Hash, name: str, array: npt.NDArray[np.generic]) -> None:
+    digest.update(f"{name}{array.shape}".encode())
+    digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+
+
+def round_mantissa(array: FloatArray, bits: int) -> FloatArray:
+    """Round to a number of mantissa bits, so that the rest compresses to nothing.
+
+    Args:
+        array: Any finite float64 array.
+        bits: Bits of the mantissa to keep (of 52).
+
+    Returns:
+        A rounded copy; relative error at most 2**-(bits + 1).
+    """
+    mantissa, exponent = np.frexp(array)
+    scale = float(2 ** (bits + 1))
+    return np.asarray(np.ldexp(np.round(mantissa * scale) / scale, exponent), dtype=np.float64)
+
+
+def quantized(database: Database) -> Database:
+    """Round the derivatives to six significant digits; trims stay as they are.
+
+    The database in memory and the file then hold the same bits, and the file is small.
+
+    Args:
+        database: A freshly built database.
+
+    Returns:
+        The rounded database.
+    """
+    names = ("A", "B", "C", "D", "df_dnacelle")
+    return replace(database, **{name: round_mantissa(getattr(database, name), JACOBIAN_BITS) for name in names})
+
+
+def expected_shapes(database: Database) -> dict[str, tuple[int, ...]]:
+    """Shapes that the arrays must have, from the axes and the lists of variables.
+
+    Args:
+        database: The database.
+
+    Returns:
+        Shape by name of the array.
+    """
+    grid = (database.layer_acceleration.size, database.airspeed.size, database.nacelle.size)
+    nx, nu, ny = len(database.states), len(database.inputs), len(database.outputs)
+    tails: dict[str, tuple[int, ...]] = {
+        "x_ref": (nx,), "u_ref": (nu,), "y_ref": (ny,), "xdot_ref": (nx,), "df_dnacelle": (nx,), "valid": (),
+        "A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu),
+    }  # fmt: skip
+    return {name: grid + tail for name, tail in tails.items()} | {"flap": grid[1:]}
+
+
+def check_database(database: Database, file: str | None = None) -> None:
+    """Refuse a database that the kernels could not fly.
+
+    Args:
+        database: The database.
+        file: File it came from, for the message.
+
+    Raises:
+        InputError: Naming the array and what is wrong with it.
+    """
+    _check_variables(database, file)
+    for name in AXES:
+        _check_axis(name, getattr(database, name), file, shortest=1 if name == "layer_acceleration" else 2)
+    if np.min(np.abs(database.layer_acceleration)) > 1e-9:
+        raise InputError(
+            "there is no layer of level flight",
+            file=file,
+            key="layer_acceleration",
+            value=database.layer_acceleration.tolist(),
+            mend="add the layer of zero acceleration",
+        )
+    if database.layer_acceleration.size > 8:
+        raise InputError("too many layers", file=file, key="layer_acceleration",
+                         value=database.layer_acceleration.size, allowed="at most 8")  # fmt: skip
+    for name, shape in expected_shapes(database).items():
+        array = getattr(database, name)
+        if array.shape != shape:
+            raise InputError("wrong shape", file=file, key=name, value=array.shape, allowed=f"{shape}")
+        if array.dtype != np.bool_ and not np.all(np.isfinite(array)):
+            where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+            raise InputError(
+                "not a finite number",
+                file=file,
+                key=f"{name}{list(where)}",
+                value=float(array[where]),
+                mend="mark the cell invalid and fill it from the nearest airspeed that has a trim",
+            )
+    if not np.isfinite(database.rotor_speed):
+        raise InputError("not a finite number", file=file, key="rotor_speed", value=database.rotor_speed)
+    if not database.valid[database.level_layer].any():
+        raise InputError("no cell of the level layer is valid", file=file, key="valid")
+
+
+def _check_variables(database: Database, file: str | None) -> None:
+    for kind, variables in (("states", database.states), ("inputs", database.inputs), ("outputs", database.outputs)):
+        names = [variable.name for variable in variables]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError("the same name twice", file=file, key=kind, value=name, mend="rename one of them")
+    for name in SCHEDULING_STATES:
+        if position(database.states, name) < 0:
+            raise InputError(
+                f"the state '{name}' is missing, from which airspeed and angle of attack are computed",
+                file=file,
+                key="states",
+                value=[variable.name for variable in database.states],
+                mend=f"name the state that means '{name}' so",
+            )
+
+
+def _check_axis(name: str, axis: FloatArray, file: str | None, *, shortest: int) -> None:
+    if axis.ndim != 1 or axis.size < shortest:
+        raise InputError("not an axis", file=file, key=name, value=axis.shape, allowed=f"{shortest} or more values")
+    if not np.all(np.isfinite(axis)):
+        raise InputError("not a finite number on the axis", file=file, key=name)
+    if np.any(np.diff(axis) <= 0.0):
+        first = int(np.argmax(np.diff(axis) <= 0.0)) + 1
+        raise InputError("the axis does not ascend", file=file, key=f"{name}[{first}]", value=float(axis[first]),
+                         mend="sort the axis and the arrays with it")  # fmt: skip
+
+
+def load_database(path: str | Path | None = None) -> Database:
+    """Read a database; without a path, the shipped one.
+
+    Args:
+        path: A NetCDF file as written by ``save_database``; the layout is described in docs/lpv.md.
+
+    Returns:
+        The database, checked, its arrays read-only.
+
+    Raises:
+        InputError: The file is missing, no NetCDF file, or not a database the kernels could fly.
+    """
+    from rtsim.lpv.database_file import read_database
+
+    return read_database(path)
+
+
+def save_database(database: Database, path: str | Path) -> None:
+    """Write a database to NetCDF; the target is replaced in one move when all is written.
+
+    Cells without a trim are written as missing values and filled again on reading.
+
+    Args:
+        database: What to write.
+        path: The target, usually ``*.nc``.
+
+    Raises:
+        OutputError: The file could not be written; the old one, if any, still stands.
+    """
+    from rtsim.lpv.database_file import write_database
+
+    write_database(database, path)
+
+
+def fill_invalid(arrays: Mapping[str, npt.NDArray[np.generic]], airspeed: FloatArray, level_layer: int) -> None:
+    """Fill cells without a trim from the nearest valid airspeed of the same layer and nacelle angle, in place.
+
+    State, input, output and derivatives come from the same cell; never from another nacelle angle, since that would
+    mix trims of different configurations. A layer without any trim at a nacelle angle repeats the level layer.
+
+    Args:
+        arrays: Writable gridded arrays by name; ``valid`` says which cells to fill.
+        airspeed: The airspeed axis (V,) [m/s].
+        level_layer: Number of the layer of level flight.
+
+    Raises:
+        InputError: The level layer has no trim at all at some nacelle angle.
+    """
+    valid = arrays["valid"]
+    order = [level_layer, *(layer for layer in range(valid.shape[0]) if layer != level_layer)]
+    for nacelle in range(valid.shape[2]):
+        for layer in order:
+            good = np.flatnonzero(valid[layer, :, nacelle])
+            if good.size == 0 and layer == level_layer:
+                raise InputError(
+                    "no trim at any airspeed", key=f"valid[{layer}, :, {nacelle}]", mend="leave this nacelle angle out"
+                )
+            for v in np.flatnonzero(~valid[layer, :, nacelle].astype(bool)):
+                source = (layer, int(good[np.argmin(np.abs(airspeed[good] - airspeed[v]))]), nacelle) if good.size else (
+                    level_layer, v, nacelle)  # fmt: skip
+                for name, array in arrays.items():
+                    if name != "valid":
+                        array[layer, v, nacelle] = array[source]

@@ -1,0 +1,502 @@
+"""Compiled LPV aircraft: state derivative, outputs and one Runge-Kutta step.
+
+Legend: x total state, u total input, y output, rho = (airspeed V, nacelle angle n, angle of attack alpha). A cell is
+one grid point of one layer, flattened to ``[x_ref | u_ref | xdot_ref | columns of A | columns of B]``; rows of
+``xdot_ref``, ``A`` and ``B`` are the *active* ones (not zero everywhere), padded with zeros to a multiple of four, and
+the columns are the active ones, stored one after the other so that each multiply-add runs down contiguous memory.
+
+Every sum has a fixed order and no library routine is called, so results are bit-reproducible on one machine type.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from rtsim.units import GRAVITY
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+FORM_PLAIN = 0
+"""The paper's form: linear models interpolated in airspeed and nacelle angle."""
+FORM_STITCHED = 1
+"""Gravity, Coriolis and kinematic terms nonlinear; aerodynamics from the level layer."""
+FORM_LAYERED = 2
+"""Stitched, with the aerodynamics blended between the layers by angle of attack (the default)."""
+
+REFRESH_EVERY_STAGE = 0
+"""Matrices and references are interpolated in each of the four stages of a step."""
+REFRESH_REFERENCE = 1
+"""References in each stage, matrices once per step (the default; the difference is measured in docs/lpv.md)."""
+
+FLAG_AIRSPEED_LOW = 1
+"""Bit of the flags: below the slowest airspeed of the grid; the slowest is used."""
+FLAG_AIRSPEED_HIGH = 2
+"""Bit of the flags: above the fastest airspeed of the grid; the fastest is used."""
+FLAG_NACELLE = 4
+"""Bit of the flags: nacelle angle outside the grid; the nearest is used."""
+FLAG_NO_TRIM = 8
+"""Bit of the flags: a neighbouring grid point has no trim and was filled from the nearest airspeed that has one."""
+
+ALPHA_SPEED = 4.5
+"""V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
+GAP_NONE = math.radians(1.0)
+"""Layers whose angles of attack differ by less than this are not blended [rad]."""
+GAP_FULL = math.radians(2.0)
+"""From this difference on they are blended in full; between the two the blend fades in [rad]."""
+
+# positions in LpvTables.roles
+R_FORM = 0
+R_LEVEL = 1
+R_U = 2
+R_W = 3
+R_Q = 4
+R_PITCH = 5
+R_ALTITUDE = 6
+R_NACELLE_RATE = 7
+R_NACELLE_ACCELERATION = 8
+R_STATES = 9
+R_INPUTS = 10
+R_OUTPUTS = 11
+R_ROWS = 12
+R_OUTPUT_ROWS = 13
+R_REFRESH = 14
+R_COUNT = 15
+
+# positions in the work array; the sections after the last are laid out by `work_size`
+W_FLAGS = 0
+W_ALPHA = 1
+W_CORNER = 2
+W_LAYER_SHARE = 6
+W_MAX_LAYERS = 8
+W_BLEND = W_LAYER_SHARE + W_MAX_LAYERS
+
+
+class LpvTables(NamedTuple):
+    """A database prepared for the kernels by ``rtsim.lpv.tables.prepare_tables``; read-only."""
+
+    airspeed: FloatArray
+    """Airspeed axis (V,) [m/s], ascending."""
+    nacelle: FloatArray
+    """Nacelle axis (N,) [rad], ascending."""
+    alpha: FloatArray
+    """Scheduling angle of attack of each trim (V, N, L) [rad]."""
+    valid: FloatArray
+    """1.0 where the level layer has a trim, 0.0 where it was filled (V, N)."""
+    cells: FloatArray
+    """Dynamics of each cell (V, N, L, block), see the module's legend."""
+    output_cells: FloatArray
+    """Outputs of each cell (V, N, L, block): ``[y_ref | columns of C | columns of D]``, rows padded."""
+    rows: IntArray
+    """State number of each active row."""
+    state_columns: IntArray
+    """State number of each active column of A."""
+    input_columns: IntArray
+    """Input number of each active column of B."""
+    roles: IntArray
+    """Form, sizes and positions of the variables that have a meaning here (``R_*``)."""
+
+
+@njit(cache=True)
+def _rows_at(tables: LpvTables) -> int:
+    """Where the row sums stand in the work array; the scratch vectors follow at `_scratch_at`."""
+    return W_BLEND + max(tables.cells.shape[3], tables.output_cells.shape[3])
+
+
+@njit(cache=True)
+def _scratch_at(tables: LpvTables) -> int:
+    return _rows_at(tables) + max(tables.roles[R_ROWS], tables.roles[R_OUTPUT_ROWS])
+
+
+@njit(cache=True)
+def work_size(tables: LpvTables) -> int:
+    """Give the length of the work array that the kernels need.
+
+    Args:
+        tables: Prepared tables.
+
+    Returns:
+        The number of float64 values.
+    """
+    return _scratch_at(tables) + 3 * tables.roles[R_STATES] + tables.roles[R_INPUTS]
+
+
+@njit(cache=True)
+def _cell_below(axis: FloatArray, value: float) -> int:
+    """Number of the grid interval that holds a value (clipped to the first and last)."""
+    low = 0
+    high = axis.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if axis[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True)
+def _smoothstep(s: float) -> float:
+    if s <= 0.0:
+        return 0.0
+    if s >= 1.0:
+        return 1.0
+    return s * s * (3.0 - 2.0 * s)
+
+
+@njit(cache=True)
+def _layer_step(alpha: float, here: float, beyond: float) -> float:
+    """How far the angle of attack has gone from one layer towards the next, smoothed, in [0, 1]."""
+    gap = beyond - here
+    size = abs(gap)
+    if size < GAP_NONE:
+        return 0.0
+    fade = _smoothstep((size - GAP_NONE) / (GAP_FULL - GAP_NONE))
+    return fade * _smoothstep((alpha - here) / gap)
+
+
+@njit(cache=True)
+def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
+    """Angle of attack as used for scheduling: with a headwind of V0 added, so that it is defined in hover.
+
+    In rearward flight the headwind grows by the rearward speed; the angle then stays continuous at -V0, where it would
+    otherwise turn by half a circle.
+
+    Args:
+        u: Air-relative velocity along body x [m/s].
+        w: Air-relative velocity along body z [m/s].
+        sine: Sine of the pitch attitude.
+        cosine: Cosine of the pitch attitude.
+
+    Returns:
+        The angle [rad]; the pitch attitude in any level flight.
+    """
+    headwind = ALPHA_SPEED + max(0.0, -(u * cosine + w * sine))
+    return math.atan2(w + headwind * sine, u + headwind * cosine)
+
+
+@njit(cache=True)
+def _locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatArray) -> tuple[int, int]:
+    """Find the cell of the present state: corner weights, layer shares and flags into ``work``."""
+    roles = tables.roles
+    u = x[roles[R_U]]
+    w = x[roles[R_W]]
+    pitch = x[roles[R_PITCH]]
+    sine = math.sin(pitch)
+    cosine = math.cos(pitch)
+    airspeed = u * cosine + w * sine
+    flags = int(work[W_FLAGS])
+
+    last_v = tables.airspeed.shape[0] - 1
+    last_n = tables.nacelle.shape[0] - 1
+    i = _cell_below(tables.airspeed, airspeed)
+    j = _cell_below(tables.nacelle, nacelle_angle)
+    s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
+    t = (nacelle_angle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
+    # 1e-9 of a cell: rounding of an angle on the stop is not an excursion
+    if i == 0 and s < -1e-9:
+        flags |= FLAG_AIRSPEED_LOW
+    if i == last_v - 1 and s > 1.0 + 1e-9:
+        flags |= FLAG_AIRSPEED_HIGH
+    if (j == 0 and t < -1e-9) or (j == last_n - 1 and t > 1.0 + 1e-9):
+        flags |= FLAG_NACELLE
+    s = min(1.0, max(0.0, s))
+    t = min(1.0, max(0.0, t))
+    w00 = (1.0 - s) * (1.0 - t)
+    w01 = (1.0 - s) * t
+    w10 = s * (1.0 - t)
+    w11 = s * t
+    work[W_CORNER] = w00
+    work[W_CORNER + 1] = w01
+    work[W_CORNER + 2] = w10
+    work[W_CORNER + 3] = w11
+    covered = (
+        w00 * tables.valid[i, j]
+        + w01 * tables.valid[i, j + 1]
+        + w10 * tables.valid[i + 1, j]
+        + w11 * tables.valid[i + 1, j + 1]
+    )
+    if covered < 1.0 - 1e-9:
+        flags |= FLAG_NO_TRIM
+    work[W_FLAGS] = flags
+
+    layers = tables.alpha.shape[2]
+    level = roles[R_LEVEL]
+    for layer in range(layers):
+        work[W_LAYER_SHARE + layer] = 0.0
+    if layers == 1:
+        work[W_LAYER_SHARE] = 1.0
+        return i, j
+    alpha = scheduling_alpha(u, w, sine, cosine)
+    work[W_ALPHA] = alpha
+    # Walk outwards from the level layer. `gone` is the share that has left the layer before; the decelerating side
+    # gets its part of what the accelerating side left, so that the shares always add up to one.
+    rest = 1.0
+    for side in range(2):
+        direction = 1 - 2 * side
+        gone = rest
+        layer = level
+        here = _corner_alpha(tables, i, j, layer, work)
+        while 0 <= layer + direction < layers:
+            beyond = _corner_alpha(tables, i, j, layer + direction, work)
+            further = gone * _layer_step(alpha, here, beyond)
+            if layer == level:
+                rest -= further
+            else:
+                work[W_LAYER_SHARE + layer] = gone - further
+            layer += direction
+            gone = further
+            here = beyond
+        if layer != level:
+            work[W_LAYER_SHARE + layer] = gone
+    work[W_LAYER_SHARE + level] = rest
+    return i, j
+
+
+@njit(cache=True)
+def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArray) -> float:
+    return (
+        work[W_CORNER] * tables.alpha[i, j, layer]
+        + work[W_CORNER + 1] * tables.alpha[i, j + 1, layer]
+        + work[W_CORNER + 2] * tables.alpha[i + 1, j, layer]
+        + work[W_CORNER + 3] * tables.alpha[i + 1, j + 1, layer]
+    )
+
+
+@njit(cache=True)
+def _blend(cells: FloatArray, i: int, j: int, first: int, last: int, work: FloatArray) -> None:
+    """Interpolate entries first..last-1 of the cells around (i, j) into the blend section of ``work``."""
+    count = last - first
+    target = work[W_BLEND + first : W_BLEND + last]
+    fresh = True
+    for layer in range(cells.shape[2]):
+        share = work[W_LAYER_SHARE + layer]
+        if share == 0.0:
+            continue
+        w0 = share * work[W_CORNER]
+        w1 = share * work[W_CORNER + 1]
+        w2 = share * work[W_CORNER + 2]
+        w3 = share * work[W_CORNER + 3]
+        c0 = cells[i, j, layer, first:last]
+        c1 = cells[i, j + 1, layer, first:last]
+        c2 = cells[i + 1, j, layer, first:last]
+        c3 = cells[i + 1, j + 1, layer, first:last]
+        if fresh:
+            for k in range(count):
+                target[k] = w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
+            fresh = False
+        else:
+            for k in range(count):
+                target[k] += w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
+
+
+@njit(cache=True)
+def _apply(tables: LpvTables, x: FloatArray, u: FloatArray, xdot: FloatArray, work: FloatArray) -> None:
+    """Evaluate the blended model at (x, u)."""
+    roles = tables.roles
+    states = roles[R_STATES]
+    inputs = roles[R_INPUTS]
+    rows = roles[R_ROWS]
+    total = work[_rows_at(tables) : _rows_at(tables) + rows]
+    x_ref = work[W_BLEND : W_BLEND + states]
+    u_ref = work[W_BLEND + states : W_BLEND + states + inputs]
+    position = W_BLEND + states + inputs
+    for k in range(rows):
+        total[k] = work[position + k]
+    position += rows
+    for c in range(tables.state_columns.shape[0]):
+        column = tables.state_columns[c]
+        d = x[column] - x_ref[column]
+        for k in range(rows):
+            total[k] += work[position + k] * d
+        position += rows
+    for c in range(tables.input_columns.shape[0]):
+        column = tables.input_columns[c]
+        d = u[column] - u_ref[column]
+        for k in range(rows):
+            total[k] += work[position + k] * d
+        position += rows
+    for k in range(states):
+        xdot[k] = 0.0
+    for k in range(tables.rows.shape[0]):
+        xdot[tables.rows[k]] = total[k]
+    if roles[R_FORM] != FORM_PLAIN:
+        _add_rigid_body(roles, x, xdot)
+
+
+@njit(cache=True)
+def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
+    """Add gravity, Coriolis and kinematics of the symmetric plane (body axes, z down, altitude up)."""
+    u = x[roles[R_U]]
+    w = x[roles[R_W]]
+    q = x[roles[R_Q]]
+    pitch = x[roles[R_PITCH]]
+    sine = math.sin(pitch)
+    cosine = math.cos(pitch)
+    xdot[roles[R_U]] += -GRAVITY * sine - q * w
+    xdot[roles[R_W]] += GRAVITY * cosine + q * u
+    xdot[roles[R_PITCH]] += q
+    xdot[roles[R_ALTITUDE]] += u * sine - w * cosine
+
+
+@njit(cache=True)
+def lpv_derivative(
+    tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, xdot: FloatArray, work: FloatArray
+) -> None:
+    """State derivative of the LPV aircraft.
+
+    ``work[W_FLAGS]`` collects the flags (bitwise or with what stands there); the caller clears it.
+
+    Args:
+        tables: Prepared tables.
+        x: Total state (nx,).
+        u: Total input (nu,), nacelle rate and acceleration included.
+        nacelle_angle: Nacelle angle [rad].
+        xdot: Receives the state derivative (nx,).
+        work: Scratch of ``work_size(tables)`` values.
+    """
+    i, j = _locate(tables, x, nacelle_angle, work)
+    _blend(tables.cells, i, j, 0, tables.cells.shape[3], work)
+    _apply(tables, x, u, xdot, work)
+
+
+@njit(cache=True)
+def lpv_outputs(
+    tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, y: FloatArray, work: FloatArray
+) -> None:
+    """Outputs of the LPV aircraft.
+
+    Args:
+        tables: Prepared tables.
+        x: Total state (nx,).
+        u: Total input (nu,), nacelle rate and acceleration included.
+        nacelle_angle: Nacelle angle [rad].
+        y: Receives the outputs (ny,).
+        work: Scratch of ``work_size(tables)`` values.
+    """
+    roles = tables.roles
+    states = roles[R_STATES]
+    inputs = roles[R_INPUTS]
+    outputs = roles[R_OUTPUTS]
+    rows = roles[R_OUTPUT_ROWS]
+    i, j = _locate(tables, x, nacelle_angle, work)
+    _blend(tables.cells, i, j, 0, states + inputs, work)
+    scratch = _scratch_at(tables)
+    deviation = work[scratch : scratch + states + inputs]
+    for k in range(states):
+        deviation[k] = x[k] - work[W_BLEND + k]
+    if roles[R_ALTITUDE] >= 0:
+        deviation[roles[R_ALTITUDE]] = 0.0
+    for k in range(inputs):
+        deviation[states + k] = u[k] - work[W_BLEND + states + k]
+    _blend(tables.output_cells, i, j, 0, tables.output_cells.shape[3], work)
+    total = work[_rows_at(tables) : _rows_at(tables) + rows]
+    for k in range(rows):
+        total[k] = work[W_BLEND + k]
+    position = W_BLEND + rows
+    for column in range(states + inputs):
+        d = deviation[column]
+        for k in range(rows):
+            total[k] += work[position + k] * d
+        position += rows
+    for k in range(outputs):
+        y[k] = total[k]
+
+
+@njit(cache=True)
+def lpv_step(
+    tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_path: FloatArray, dt: float, work: FloatArray
+) -> None:
+    """Advance the state by one classical Runge-Kutta step, in place.
+
+    Stick, lever and gusts are held over the step; nacelle angle, rate and acceleration follow the path. The flags in
+    ``work[W_FLAGS]`` are cleared first and then hold those of all four stages.
+
+    Args:
+        tables: Prepared tables.
+        x: Total state (nx,); replaced by the state at the end of the step.
+        u: Total input (nu,); its nacelle rate and acceleration are ignored, the path's are used.
+        nacelle_path: Rows start, middle, end of the step; columns angle [rad], rate [rad/s], acceleration [rad/s^2].
+        dt: Length of the step [s].
+        work: Scratch of ``work_size(tables)`` values.
+    """
+    roles = tables.roles
+    states = roles[R_STATES]
+    inputs = roles[R_INPUTS]
+    block = tables.cells.shape[3]
+    start = _scratch_at(tables)
+    stage_x = work[start : start + states]
+    slope = work[start + states : start + 2 * states]
+    total = work[start + 2 * states : start + 3 * states]
+    stage_u = work[start + 3 * states : start + 3 * states + inputs]
+    reference = states + inputs + roles[R_ROWS]
+    every_stage = roles[R_REFRESH] == REFRESH_EVERY_STAGE
+    rate = roles[R_NACELLE_RATE]
+    acceleration = roles[R_NACELLE_ACCELERATION]
+    for k in range(inputs):
+        stage_u[k] = u[k]
+    for k in range(states):
+        stage_x[k] = x[k]
+        total[k] = 0.0
+    work[W_FLAGS] = 0.0
+    for stage in range(4):
+        row = (stage + 1) // 2
+        if rate >= 0:
+            stage_u[rate] = nacelle_path[row, 1]
+        if acceleration >= 0:
+            stage_u[acceleration] = nacelle_path[row, 2]
+        i, j = _locate(tables, stage_x, nacelle_path[row, 0], work)
+        if every_stage or stage == 0:
+            _blend(tables.cells, i, j, 0, block, work)
+        else:
+            _blend(tables.cells, i, j, 0, reference, work)
+        _apply(tables, stage_x, stage_u, slope, work)
+        weight = 1.0 if stage == 0 or stage == 3 else 2.0
+        ahead = dt if stage == 2 else 0.5 * dt
+        for k in range(states):
+            total[k] += weight * slope[k]
+            stage_x[k] = x[k] + ahead * slope[k]
+    for k in range(states):
+        x[k] += dt / 6.0 * total[k]
+
+
+@njit(cache=True)
+def lpv_step_steady(
+    tables: LpvTables,
+    x: FloatArray,
+    u: FloatArray,
+    nacelle_angle: float,
+    nacelle_rate: float,
+    nacelle_acceleration: float,
+    dt: float,
+    work: FloatArray,
+    path: FloatArray,
+) -> int:
+    """``lpv_step`` with constant nacelle acceleration over the step.
+
+    Args:
+        tables: Prepared tables.
+        x: Total state (nx,); replaced by the state at the end of the step.
+        u: Total input (nu,).
+        nacelle_angle: Angle at the start of the step [rad].
+        nacelle_rate: Rate at the start of the step [rad/s].
+        nacelle_acceleration: Acceleration during the step [rad/s^2].
+        dt: Length of the step [s].
+        work: Scratch of ``work_size(tables)`` values.
+        path: Scratch (3, 3) for the nacelle path.
+
+    Returns:
+        The flags of the step (``FLAG_*``), 0 where all was inside the grid.
+    """
+    for row in range(3):
+        t = 0.5 * dt * row
+        path[row, 0] = nacelle_angle + t * (nacelle_rate + 0.5 * t * nacelle_acceleration)
+        path[row, 1] = nacelle_rate + t * nacelle_acceleration
+        path[row, 2] = nacelle_acceleration
+    lpv_step(tables, x, u, path, dt, work)
+    return int(work[W_FLAGS])

@@ -1,0 +1,187 @@
+"""Prepares a database for the compiled kernels: subtracts the rigid-body terms, drops what is zero, packs the cells."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from rtsim.errors import InputError
+from rtsim.lpv import lpv_kernels as kernels
+from rtsim.lpv.database import Database
+from rtsim.lpv.lpv_kernels import LpvTables
+from rtsim.lpv.variables import NACELLE_INPUTS, RIGID_BODY_STATES, SCHEDULING_STATES, position, required_position
+from rtsim.units import GRAVITY
+
+FloatArray = npt.NDArray[np.float64]
+Form = Literal["layered", "stitched", "plain"]
+
+FORMS: dict[Form, int] = {
+    "layered": kernels.FORM_LAYERED,
+    "stitched": kernels.FORM_STITCHED,
+    "plain": kernels.FORM_PLAIN,
+}
+"""Forms of the LPV aircraft by the name that people use; the first is the default."""
+KINEMATIC_TOLERANCE = 1e-3
+"""Largest entry that may remain in the pitch and altitude rows after their kinematics are subtracted."""
+
+
+def prepare_tables(database: Database, form: Form = "layered", *, interpolate_matrices_once: bool = True) -> LpvTables:
+    """Pack a database for the kernels.
+
+    Args:
+        database: Trim map and linear models.
+        form: ``layered`` (default), ``stitched`` or the paper's ``plain``.
+        interpolate_matrices_once: Interpolate the matrices once per step instead of in each Runge-Kutta stage; trim
+            state and input are always interpolated in each stage. The difference is measured in docs/lpv.md.
+
+    Returns:
+        The kernels' tables.
+
+    Raises:
+        InputError: The database lacks a state that the form needs, or its rows contradict the kinematics.
+    """
+    number = FORMS[form]
+    level = database.level_layer
+    layers = slice(None) if form == "layered" else slice(level, level + 1)
+    x_ref, u_ref = database.x_ref[layers], database.u_ref[layers]
+    A, B, xdot_ref = database.A[layers].copy(), database.B[layers].copy(), database.xdot_ref[layers].copy()
+    roles = _roles(database, number, level if form == "layered" else 0)
+    if form != "plain":
+        _subtract_rigid_body(database, x_ref, A, xdot_ref)
+    altitude = roles[kernels.R_ALTITUDE]
+    if altitude >= 0:
+        # The altitude has no trim value: the air is the same at every height and the ground is far.
+        A[..., altitude] = 0.0
+
+    rows, state_columns, input_columns = _active(A, B, xdot_ref)
+    padded = _padded(rows.size)
+    roles[kernels.R_ROWS] = padded
+    roles[kernels.R_OUTPUT_ROWS] = _padded(len(database.outputs))
+    roles[kernels.R_REFRESH] = kernels.REFRESH_REFERENCE if interpolate_matrices_once else kernels.REFRESH_EVERY_STAGE
+    cells = np.concatenate(
+        [
+            x_ref,
+            u_ref,
+            _columns(xdot_ref[..., rows, None], padded),
+            _columns(A[..., rows, :][..., state_columns], padded),
+            _columns(B[..., rows, :][..., input_columns], padded),
+        ],
+        axis=-1,
+    )
+    output_cells = np.concatenate(
+        [
+            _columns(matrix, int(roles[kernels.R_OUTPUT_ROWS]))
+            for matrix in (database.y_ref[layers][..., None], database.C[layers], database.D[layers])
+        ],
+        axis=-1,
+    )
+    return LpvTables(
+        airspeed=database.airspeed,
+        nacelle=database.nacelle,
+        alpha=_layers_last(scheduling_alpha(database, x_ref)),
+        valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
+        cells=_layers_last(cells),
+        output_cells=_layers_last(output_cells),
+        rows=rows,
+        state_columns=state_columns,
+        input_columns=input_columns,
+        roles=roles,
+    )
+
+
+def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
+    """Angle of attack as used for scheduling, see ``lpv_kernels.scheduling_alpha``.
+
+    Args:
+        database: Says where u, w and pitch stand.
+        x: States (..., nx).
+
+    Returns:
+        The angle (...) [rad].
+    """
+    u, w, pitch = (x[..., required_position(database.states, name, "scheduling")] for name in SCHEDULING_STATES)
+    sine, cosine = np.sin(pitch), np.cos(pitch)
+    headwind = kernels.ALPHA_SPEED + np.maximum(0.0, -(u * cosine + w * sine))
+    return np.asarray(np.arctan2(w + headwind * sine, u + headwind * cosine))
+
+
+def _roles(database: Database, form: int, level: int) -> npt.NDArray[np.int64]:
+    roles = np.zeros(kernels.R_COUNT, dtype=np.int64)
+    roles[kernels.R_FORM], roles[kernels.R_LEVEL] = form, level
+    places = (kernels.R_U, kernels.R_W, kernels.R_Q, kernels.R_PITCH, kernels.R_ALTITUDE)
+    for place, name in zip(places, RIGID_BODY_STATES, strict=True):
+        needed = form != kernels.FORM_PLAIN or name in SCHEDULING_STATES
+        purpose = "the stitched form" if name not in SCHEDULING_STATES else "scheduling"
+        if needed:
+            roles[place] = required_position(database.states, name, purpose)
+        else:
+            roles[place] = position(database.states, name)
+    places = (kernels.R_NACELLE_RATE, kernels.R_NACELLE_ACCELERATION)
+    for place, name in zip(places, NACELLE_INPUTS, strict=True):
+        roles[place] = position(database.inputs, name)
+    roles[kernels.R_STATES] = len(database.states)
+    roles[kernels.R_INPUTS] = len(database.inputs)
+    roles[kernels.R_OUTPUTS] = len(database.outputs)
+    return roles
+
+
+def _subtract_rigid_body(database: Database, x_ref: FloatArray, A: FloatArray, xdot_ref: FloatArray) -> None:
+    """Take gravity, Coriolis and kinematics out of A and xdot_ref, in place, leaving the aerodynamics."""
+    iu, iw, iq, ip, ih = (required_position(database.states, name, "the stitched form") for name in RIGID_BODY_STATES)
+    u, w, q, pitch = x_ref[..., iu], x_ref[..., iw], x_ref[..., iq], x_ref[..., ip]
+    sine, cosine = np.sin(pitch), np.cos(pitch)
+    xdot_ref[..., iu] -= -GRAVITY * sine - q * w
+    xdot_ref[..., iw] -= GRAVITY * cosine + q * u
+    xdot_ref[..., ip] -= q
+    xdot_ref[..., ih] -= u * sine - w * cosine
+    A[..., iu, ip] -= -GRAVITY * cosine
+    A[..., iu, iq] -= -w
+    A[..., iu, iw] -= -q
+    A[..., iw, ip] -= -GRAVITY * sine
+    A[..., iw, iq] -= u
+    A[..., iw, iu] -= q
+    A[..., ip, iq] -= 1.0
+    A[..., ih, iu] -= sine
+    A[..., ih, iw] -= -cosine
+    A[..., ih, ip] -= u * cosine + w * sine
+    for row, name in ((ip, "pitch"), (ih, "altitude")):
+        rest = max(np.abs(A[..., row, :]).max(), np.abs(xdot_ref[..., row]).max())
+        if rest > KINEMATIC_TOLERANCE:
+            raise InputError(
+                f"the row of '{name}' in A differs by {rest:.3g} from symmetric-plane kinematics",
+                key="A",
+                allowed="pitch' = q and altitude' = u sin(pitch) - w cos(pitch), body z axis down",
+                mend="correct the axes or signs, or fly the plain form",
+            )
+        A[..., row, :] = 0.0
+        xdot_ref[..., row] = 0.0
+    # Specific force does not depend on attitude; what is left is the rounding of the finite difference.
+    A[..., iu, ip] = 0.0
+    A[..., iw, ip] = 0.0
+
+
+def _active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDArray[np.int64], ...]:
+    """Rows and columns that are not zero in every cell."""
+    grid = tuple(range(A.ndim - 2))
+    used_a, used_b = np.any(A != 0.0, axis=grid), np.any(B != 0.0, axis=grid)
+    rows = used_a.any(axis=1) | used_b.any(axis=1) | np.any(xdot_ref != 0.0, axis=grid)
+    picks = (rows, used_a.any(axis=0), used_b.any(axis=0))
+    return tuple(np.ascontiguousarray(np.flatnonzero(pick), dtype=np.int64) for pick in picks)
+
+
+def _padded(rows: int) -> int:
+    return max(4, -(-rows // 4) * 4)
+
+
+def _columns(matrix: FloatArray, padded: int) -> FloatArray:
+    """Flatten (..., rows, columns) column after column, each padded with zeros."""
+    filled = np.zeros((*matrix.shape[:-2], matrix.shape[-1], padded))
+    filled[..., : matrix.shape[-2]] = np.swapaxes(matrix, -1, -2)
+    return filled.reshape(*matrix.shape[:-2], -1)
+
+
+def _layers_last(array: FloatArray) -> FloatArray:
+    """Reorder [layer, airspeed, nacelle, ...] to [airspeed, nacelle, layer, ...]: a cell's layers lie side by side."""
+    return np.ascontiguousarray(np.moveaxis(array, 0, 2))

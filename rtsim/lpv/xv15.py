@@ -1,0 +1,160 @@
+"""The XV-15 as the database builder sees it: solves, filters and linearizes one grid point."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+import rtsim
+import rtsim.aircraft
+from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Condition, TrimPoint, Variable, Xv15
+from rtsim.aircraft import dynamics_kernels as kernels
+from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
+from rtsim.lpv.build import GridPoint, Guess, Jacobians
+from rtsim.units import DEGREE, KNOT
+
+WING_ALPHA_LIMIT = 16.0 * DEGREE
+"""Largest wing angle of attack of an unstalled trim in airplane and conversion mode [rad]."""
+WING_BORNE_AIRSPEED = 40.0 * KNOT
+"""Airspeed above which the wing angle of attack has a meaning for the branch [m/s]."""
+FLYABLE_STICK = 1.0
+"""Stick travel: trims beyond the stops are no trims."""
+NEIGHBOUR_PITCH, NEIGHBOUR_STICK, NEIGHBOUR_COLLECTIVE = 8.0 * DEGREE, 0.35, 8.0 * DEGREE
+"""Largest change from one grid point to the next on one branch [rad, -, rad]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Xv15Grid:
+    """The nonlinear XV-15 in the form that ``rtsim.lpv.build.build_database`` asks for."""
+
+    aircraft: Xv15 = field(default_factory=Xv15.load)
+    """The nonlinear model."""
+
+    @property
+    def states(self) -> Sequence[Variable]:
+        """The states of the nonlinear model."""
+        return STATES
+
+    @property
+    def inputs(self) -> Sequence[Variable]:
+        """The inputs of the nonlinear model."""
+        return INPUTS
+
+    @property
+    def outputs(self) -> Sequence[Variable]:
+        """The outputs of the nonlinear model."""
+        return OUTPUTS
+
+    @property
+    def rotor_speed(self) -> float:
+        """Rotor speed, held [rad/s]."""
+        return float(self.aircraft.tables.configuration.rotor_speed)
+
+    @property
+    def attributes(self) -> dict[str, str | float | int]:
+        """Title, condition, hash of the aircraft's data and code, versions."""
+        configuration = self.aircraft.tables.configuration
+        return {
+            "title": "Bell XV-15, symmetric plane: trim map and linear models over the conversion corridor",
+            "mass_kg": float(configuration.mass),
+            "air_density_kg_m3": float(configuration.density),
+            "source_sha256": source_sha256(),
+            "rtsim_version": rtsim.__version__,
+            "numpy_version": np.__version__,
+            "numba_version": metadata.version("numba"),
+            "machine": platform.machine(),
+        }
+
+    def solve(self, airspeed: float, nacelle: float, acceleration: float, guess: Guess | None) -> GridPoint | None:
+        """Trim, or None where none is found from this guess.
+
+        Args:
+            airspeed: Horizontal airspeed [m/s].
+            nacelle: Nacelle angle [rad].
+            acceleration: Level acceleration [m/s^2].
+            guess: State and input to start from.
+        """
+        start = None
+        if guess is not None:
+            start = TrimPoint(guess[0], guess[1], np.zeros(len(OUTPUTS)), np.zeros(len(STATES)), True, 0.0)
+        point = self.aircraft.trim(_condition(airspeed, nacelle, acceleration), start)
+        return GridPoint(point.x, point.u, point.y, point.xdot) if point.converged else None
+
+    def reject(self, point: GridPoint, airspeed: float, nacelle: float) -> str | None:
+        """Say why a trim is stalled or beyond the controls' travel, or None where it is good.
+
+        Args:
+            point: The trim.
+            airspeed: Its airspeed [m/s].
+            nacelle: Its nacelle angle [rad].
+        """
+        del nacelle
+        if abs(point.u[INPUT.stick]) > FLYABLE_STICK:
+            return "stick beyond its stops"
+        if not 0.0 <= point.u[INPUT.lever] <= 1.0:
+            return "lever beyond its stops"
+        if airspeed > WING_BORNE_AIRSPEED and point.y[OUTPUT.wing_angle_of_attack] > WING_ALPHA_LIMIT:
+            return "wing stalled"
+        return None
+
+    def far_apart(self, point: GridPoint, neighbour: GridPoint) -> bool:
+        """Whether two neighbours differ so much that they cannot be on the same branch.
+
+        Args:
+            point: A trim.
+            neighbour: The trim it was continued from.
+        """
+        change_x, change_u = np.abs(point.x - neighbour.x), np.abs(point.u - neighbour.u)
+        return bool(
+            change_x[STATE.pitch] > NEIGHBOUR_PITCH
+            or change_u[INPUT.stick] > NEIGHBOUR_STICK
+            or change_x[STATE.collective_75] > NEIGHBOUR_COLLECTIVE
+        )
+
+    def jacobians(self, point: GridPoint, airspeed: float, nacelle: float, acceleration: float) -> Jacobians:
+        """A, B, C, D and the derivative of the state derivative with nacelle angle, at a trim.
+
+        Args:
+            point: The trim.
+            airspeed: Its airspeed [m/s].
+            nacelle: Its nacelle angle [rad].
+            acceleration: Its level acceleration [m/s^2].
+        """
+        trim = TrimPoint(point.x, point.u, point.y, point.xdot, True, 0.0)
+        model = self.aircraft.linearize(_condition(airspeed, nacelle, acceleration), trim)
+        return model.A, model.B, model.C, model.D, model.df_dnacelle
+
+    def flap(self, airspeed: float, nacelle: float) -> float:
+        """Flap deflection of the schedule [rad].
+
+        Args:
+            airspeed: Horizontal airspeed [m/s].
+            nacelle: Nacelle angle [rad].
+        """
+        return float(kernels.flap_schedule(self.aircraft.tables.controls, airspeed, nacelle))
+
+
+def _condition(airspeed: float, nacelle: float, acceleration: float) -> Condition:
+    return Condition(airspeed=airspeed, nacelle_angle=nacelle, acceleration=acceleration)
+
+
+def source_sha256() -> str:
+    """Hash the aircraft's data and code, so that a database can be told to be older than its source.
+
+    Returns:
+        SHA-256 as 64 hexadecimal digits.
+    """
+    digest = hashlib.sha256()
+    folder = Path(rtsim.aircraft.__file__).parent
+    for path in sorted([*folder.glob("*.py"), *folder.glob("data/*.toml")]):
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
