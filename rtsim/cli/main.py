@@ -7,7 +7,6 @@ import importlib.util
 import os
 import signal
 import sys
-import threading
 from collections.abc import Sequence
 from types import FrameType
 from typing import Annotated
@@ -37,7 +36,10 @@ def database_hash() -> str:
     """Give the SHA-256 of the shipped LPV database, or say why there is none."""
     if importlib.util.find_spec("rtsim.lpv.database") is None:
         return "none"
-    database = importlib.import_module("rtsim.lpv.database").load_database()
+    try:
+        database = importlib.import_module("rtsim.lpv.database").load_database()
+    except RtsimError:
+        return "none"
     return str(database.content_hash)
 
 
@@ -124,8 +126,6 @@ def run(arguments: Sequence[str] | None = None) -> int:
         overrun policy; 4 a file or socket failed; 70 a fault of rtsim's own; 130 Ctrl-C; 141 the reader of the output
         went away; 143 SIGTERM.
     """
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _raise_terminated)
     try:
         code = _invoke(arguments)
         sys.stdout.flush()
@@ -177,15 +177,16 @@ def _usage_error(error: Exception, message: str) -> int:
     """Tell a mistake in the command line, and where its help is."""
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "rtsim"
-    if type(error).__name__ == "NoArgsIsHelpError":
-        sys.stderr.write(message + "\n")
-    else:
+    if type(error).__name__ != "NoArgsIsHelpError":  # the parser has printed the help already
         _fail(f"{message.rstrip('.')}. Try '{path} --help'.")
     return EXIT_BAD_INPUT
 
 
 def main() -> None:
-    """Entry point of the ``rtsim`` command."""
+    """Entry point of the ``rtsim`` command: handles the signals of the process, then ends it with the exit code."""
+    # Shells start background jobs with SIGINT ignored; a flight must still end cleanly when it is asked to.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, _raise_terminated)
     sys.exit(run())
 
 
