@@ -1,0 +1,135 @@
+"""The hand on a running flight: pause, step, warp, reset, switch pilot, stop; from any thread or signal handler."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import Literal
+
+from rtsim.errors import InputError
+
+Action = Literal["pause", "resume", "toggle-pause", "step", "speed", "faster", "slower", "reset", "pilot", "stop"]
+
+WARP_STEPS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+"""Speeds that the keys ``+`` and ``-`` walk through, in multiples of real time."""
+SPEED_RANGE = (0.001, 1000.0)
+"""Speeds a flight may be paced at, in multiples of real time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One thing asked of the executive; it is served before the next frame."""
+
+    action: Action
+    number: float = 0.0
+    """Frames to step, or the new speed."""
+    text: str = ""
+    """Who shall fly, or why to stop."""
+
+
+class FlightControl:
+    """Requests to a running flight.
+
+    Every method may be called from any thread and from signal handlers: it only appends to a queue, which the
+    executive empties between two frames. The attributes tell what the executive is doing.
+    """
+
+    def __init__(self) -> None:
+        self.requests: deque[Request] = deque()
+        """What has been asked and not served yet."""
+        self.paused = False
+        """Whether the flight stands still."""
+        self.speed = 1.0
+        """Present speed in multiples of real time; infinite while it is not paced."""
+
+    def pause(self) -> None:
+        """Stand still after the frame that is being flown."""
+        self.requests.append(Request("pause"))
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        self.requests.append(Request("resume"))
+
+    def toggle_pause(self) -> None:
+        """Pause, or go on."""
+        self.requests.append(Request("toggle-pause"))
+
+    def step(self, frames: int = 1) -> None:
+        """Fly a number of frames at the present speed, then pause.
+
+        Args:
+            frames: How many, at least 1.
+        """
+        if frames < 1:
+            raise InputError("must be at least 1", key="frames", value=frames, mend="give a whole number from 1")
+        self.requests.append(Request("step", number=frames))
+
+    def set_speed(self, speed: float) -> None:
+        """Change the speed of the flight.
+
+        Args:
+            speed: Multiple of real time, 0.001 to 1000, or infinity for as fast as possible.
+        """
+        self.requests.append(Request("speed", number=checked_speed(speed)))
+
+    def faster(self) -> None:
+        """Take the next higher warp step."""
+        self.requests.append(Request("faster"))
+
+    def slower(self) -> None:
+        """Take the next lower warp step."""
+        self.requests.append(Request("slower"))
+
+    def reset(self) -> None:
+        """Put the aircraft back to its start; the flight goes on from there."""
+        self.requests.append(Request("reset"))
+
+    def set_pilot(self, pilot: str = "next") -> None:
+        """Hand the controls over.
+
+        Args:
+            pilot: ``mocm``, ``external`` or ``hold``, or ``next`` for the next one that is available.
+        """
+        self.requests.append(Request("pilot", text=pilot))
+
+    def stop(self, reason: str = "stopped by the user") -> None:
+        """End the flight cleanly after the frame that is being flown.
+
+        Args:
+            reason: Why, as a sentence without full stop; it becomes the end reason.
+        """
+        self.requests.append(Request("stop", text=reason))
+
+
+def checked_speed(speed: float) -> float:
+    """Refuse a speed that cannot be flown.
+
+    Args:
+        speed: Multiple of real time; infinity means not paced.
+
+    Returns:
+        The speed.
+    """
+    low, high = SPEED_RANGE
+    if not (low <= speed <= high or speed == math.inf):
+        raise InputError(
+            "is out of range",
+            key="--speed",
+            value=speed,
+            allowed=f"{low:g} to {high:g} times real time, or max",
+            mend="choose a value in this range",
+        )
+    return speed
+
+
+def neighbouring_warp(speed: float, *, upwards: bool) -> float:
+    """The next warp step.
+
+    Args:
+        speed: The present speed.
+        upwards: Whether to go faster.
+    """
+    if upwards:
+        return next((step for step in WARP_STEPS if step > speed * 1.001), WARP_STEPS[-1])
+    return next((step for step in reversed(WARP_STEPS) if step < speed / 1.001), WARP_STEPS[0])
