@@ -47,7 +47,7 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("lever", "", "controls", "Power lever after protection, 0 to 1."),
     Signal("pilot_stick", "", "controls", "Longitudinal stick as the pilot gave it."),
     Signal("pilot_lever", "", "controls", "Power lever as the pilot gave it."),
-    Signal("pilot_nacelle_rate_deg_s", "deg/s", "nacelle", "Nacelle rate as the pilot gave it."),
+    Signal("pilot_nacelle_rate_rad_s", "rad/s", "nacelle", "Nacelle rate as the pilot gave it (SI, so that a replay gets it to the last bit)."),
     Signal(
         "nacelle_command_rate_deg_s",
         "deg/s",

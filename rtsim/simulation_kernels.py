@@ -287,7 +287,7 @@ def advance(
     row[COLUMN.lever] = lever
     row[COLUMN.pilot_stick] = asked[0]
     row[COLUMN.pilot_lever] = asked[1]
-    row[COLUMN.pilot_nacelle_rate_deg_s] = asked[2] / DEGREE
+    row[COLUMN.pilot_nacelle_rate_rad_s] = asked[2]
     row[COLUMN.nacelle_command_rate_deg_s] = rate / DEGREE
     row[COLUMN.corridor_level] = float(corridor_level_step(tables.corridor, margin, dt, state.level))
     row[COLUMN.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
