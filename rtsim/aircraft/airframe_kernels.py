@@ -84,6 +84,9 @@ def wing_coefficients(
                 row = 4 * end + k + step
                 lift += weight * curve(wing.lift, row, folded)
                 drag += weight * curve(wing.drag, row, folded)
+    if folded != alpha:
+        # Lift is normal to the flow on the side given by the flow's direction: mirrored flow, mirrored lift.
+        lift = -lift
     lift *= 1.0 + wing.mach_gain * mast_fraction * min(max((mach - 0.2) / 0.2, 0.0), 1.0)
     return lift, drag
 

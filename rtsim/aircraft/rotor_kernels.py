@@ -101,6 +101,11 @@ def rotor_loads(
             speed_squared = ut * ut + up * up
             speed = math.sqrt(speed_squared)
             alpha = root_pitch + rotor.twist[i] - math.atan2(up, ut)
+            # In reversed flow the difference can leave the circle on which the section tables are printed.
+            if alpha > math.pi:
+                alpha -= 2.0 * math.pi
+            elif alpha < -math.pi:
+                alpha += 2.0 * math.pi
             cl, cd = _section(rotor, i, alpha, speed / air.sound_speed)
             scale = 0.5 * air.density * speed * rotor.chord[i] * rotor.widths[i]
             lift = scale * cl * rotor.lifting[i]
