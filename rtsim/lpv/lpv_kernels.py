@@ -29,10 +29,12 @@ FORM_STITCHED = 1
 FORM_LAYERED = 2
 """Stitched, with the aerodynamics blended between the layers by angle of attack (the default)."""
 
-REFRESH_EVERY_STAGE = 0
-"""Matrices and references are interpolated in each of the four stages of a step."""
+REFRESH_ONCE = 0
+"""Interpolate once per step, at the state at its start and the nacelle angle at its middle."""
 REFRESH_REFERENCE = 1
-"""References in each stage, matrices once per step (the default; the difference is measured in docs/lpv.md)."""
+"""Interpolate the matrices once per step, trim state and input in each of its four stages."""
+REFRESH_EVERY_STAGE = 2
+"""Interpolate everything in each stage."""
 
 FLAG_AIRSPEED_LOW = 1
 """Bit of the flags: below the slowest airspeed of the grid; the slowest is used."""
@@ -123,7 +125,7 @@ def work_size(tables: LpvTables) -> int:
     Returns:
         The number of float64 values.
     """
-    return _scratch_at(tables) + 3 * tables.roles[R_STATES] + tables.roles[R_INPUTS]
+    return _scratch_at(tables) + 4 * tables.roles[R_STATES] + 2 * tables.roles[R_INPUTS]
 
 
 @njit(cache=True)
@@ -269,10 +271,8 @@ def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArra
 
 
 @njit(cache=True)
-def _blend(cells: FloatArray, i: int, j: int, first: int, last: int, work: FloatArray) -> None:
-    """Interpolate entries first..last-1 of the cells around (i, j) into the blend section of ``work``."""
-    count = last - first
-    target = work[W_BLEND + first : W_BLEND + last]
+def _blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, target: FloatArray) -> None:
+    """Interpolate the first ``count`` entries of the cells around (i, j)."""
     fresh = True
     for layer in range(cells.shape[2]):
         share = work[W_LAYER_SHARE + layer]
@@ -282,10 +282,10 @@ def _blend(cells: FloatArray, i: int, j: int, first: int, last: int, work: Float
         w1 = share * work[W_CORNER + 1]
         w2 = share * work[W_CORNER + 2]
         w3 = share * work[W_CORNER + 3]
-        c0 = cells[i, j, layer, first:last]
-        c1 = cells[i, j + 1, layer, first:last]
-        c2 = cells[i + 1, j, layer, first:last]
-        c3 = cells[i + 1, j + 1, layer, first:last]
+        c0 = cells[i, j, layer]
+        c1 = cells[i, j + 1, layer]
+        c2 = cells[i + 1, j, layer]
+        c3 = cells[i + 1, j + 1, layer]
         if fresh:
             for k in range(count):
                 target[k] = w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
@@ -296,30 +296,35 @@ def _blend(cells: FloatArray, i: int, j: int, first: int, last: int, work: Float
 
 
 @njit(cache=True)
-def _apply(tables: LpvTables, x: FloatArray, u: FloatArray, xdot: FloatArray, work: FloatArray) -> None:
-    """Evaluate the blended model at (x, u)."""
+def _apply(
+    tables: LpvTables,
+    x: FloatArray,
+    u: FloatArray,
+    xdot: FloatArray,
+    reference: FloatArray,
+    columns: FloatArray,
+    deviation: FloatArray,
+    total: FloatArray,
+) -> None:
+    """Evaluate the blended model at (x, u). Views come from the caller: making them here costs as much as the sums."""
     roles = tables.roles
     states = roles[R_STATES]
-    inputs = roles[R_INPUTS]
     rows = roles[R_ROWS]
-    total = work[_rows_at(tables) : _rows_at(tables) + rows]
-    x_ref = work[W_BLEND : W_BLEND + states]
-    u_ref = work[W_BLEND + states : W_BLEND + states + inputs]
-    position = W_BLEND + states + inputs
-    for k in range(rows):
-        total[k] = work[position + k]
-    position += rows
-    for c in range(tables.state_columns.shape[0]):
+    of_states = tables.state_columns.shape[0]
+    of_inputs = tables.input_columns.shape[0]
+    for c in range(of_states):
         column = tables.state_columns[c]
-        d = x[column] - x_ref[column]
-        for k in range(rows):
-            total[k] += work[position + k] * d
-        position += rows
-    for c in range(tables.input_columns.shape[0]):
+        deviation[c] = x[column] - reference[column]
+    for c in range(of_inputs):
         column = tables.input_columns[c]
-        d = u[column] - u_ref[column]
+        deviation[of_states + c] = u[column] - reference[states + column]
+    for k in range(rows):
+        total[k] = columns[k]
+    position = rows
+    for c in range(of_states + of_inputs):
+        d = deviation[c]
         for k in range(rows):
-            total[k] += work[position + k] * d
+            total[k] += columns[position + k] * d
         position += rows
     for k in range(states):
         xdot[k] = 0.0
@@ -360,9 +365,21 @@ def lpv_derivative(
         xdot: Receives the state derivative (nx,).
         work: Scratch of ``work_size(tables)`` values.
     """
+    inputs_end = W_BLEND + tables.roles[R_STATES] + tables.roles[R_INPUTS]
+    block = tables.cells.shape[3]
+    rows_at, scratch_at = _rows_at(tables), _scratch_at(tables)
     i, j = _locate(tables, x, nacelle_angle, work)
-    _blend(tables.cells, i, j, 0, tables.cells.shape[3], work)
-    _apply(tables, x, u, xdot, work)
+    _blend(tables.cells, i, j, block, work, work[W_BLEND : W_BLEND + block])
+    _apply(
+        tables,
+        x,
+        u,
+        xdot,
+        work[W_BLEND:inputs_end],
+        work[inputs_end : W_BLEND + block],
+        work[scratch_at:],
+        work[rows_at:scratch_at],
+    )
 
 
 @njit(cache=True)
@@ -385,24 +402,25 @@ def lpv_outputs(
     outputs = roles[R_OUTPUTS]
     rows = roles[R_OUTPUT_ROWS]
     i, j = _locate(tables, x, nacelle_angle, work)
-    _blend(tables.cells, i, j, 0, states + inputs, work)
-    scratch = _scratch_at(tables)
-    deviation = work[scratch : scratch + states + inputs]
+    block = tables.output_cells.shape[3]
+    model = work[W_BLEND : W_BLEND + max(block, states + inputs)]
+    _blend(tables.cells, i, j, states + inputs, work, model)
+    deviation = work[_scratch_at(tables) :]
     for k in range(states):
-        deviation[k] = x[k] - work[W_BLEND + k]
+        deviation[k] = x[k] - model[k]
     if roles[R_ALTITUDE] >= 0:
         deviation[roles[R_ALTITUDE]] = 0.0
     for k in range(inputs):
-        deviation[states + k] = u[k] - work[W_BLEND + states + k]
-    _blend(tables.output_cells, i, j, 0, tables.output_cells.shape[3], work)
+        deviation[states + k] = u[k] - model[states + k]
+    _blend(tables.output_cells, i, j, block, work, model)
     total = work[_rows_at(tables) : _rows_at(tables) + rows]
     for k in range(rows):
-        total[k] = work[W_BLEND + k]
-    position = W_BLEND + rows
+        total[k] = model[k]
+    position = rows
     for column in range(states + inputs):
         d = deviation[column]
         for k in range(rows):
-            total[k] += work[position + k] * d
+            total[k] += model[position + k] * d
         position += rows
     for k in range(outputs):
         y[k] = total[k]
@@ -428,34 +446,40 @@ def lpv_step(
     roles = tables.roles
     states = roles[R_STATES]
     inputs = roles[R_INPUTS]
-    block = tables.cells.shape[3]
-    start = _scratch_at(tables)
-    stage_x = work[start : start + states]
-    slope = work[start + states : start + 2 * states]
-    total = work[start + 2 * states : start + 3 * states]
-    stage_u = work[start + 3 * states : start + 3 * states + inputs]
-    reference = states + inputs + roles[R_ROWS]
-    every_stage = roles[R_REFRESH] == REFRESH_EVERY_STAGE
+    refresh = roles[R_REFRESH]
     rate = roles[R_NACELLE_RATE]
     acceleration = roles[R_NACELLE_ACCELERATION]
+    block = tables.cells.shape[3]
+    scratch = _scratch_at(tables)
+    model = work[W_BLEND : W_BLEND + block]
+    reference = work[W_BLEND : W_BLEND + states + inputs]
+    columns = work[W_BLEND + states + inputs : W_BLEND + block]
+    row_sums = work[_rows_at(tables) : scratch]
+    stage_x = work[scratch : scratch + states]
+    slope = work[scratch + states : scratch + 2 * states]
+    total = work[scratch + 2 * states : scratch + 3 * states]
+    stage_u = work[scratch + 3 * states : scratch + 3 * states + inputs]
+    deviation = work[scratch + 3 * states + inputs : scratch + 4 * states + 2 * inputs]
     for k in range(inputs):
         stage_u[k] = u[k]
     for k in range(states):
         stage_x[k] = x[k]
         total[k] = 0.0
     work[W_FLAGS] = 0.0
+    if refresh == REFRESH_ONCE:
+        i, j = _locate(tables, x, nacelle_path[1, 0], work)
+        _blend(tables.cells, i, j, block, work, model)
     for stage in range(4):
         row = (stage + 1) // 2
         if rate >= 0:
             stage_u[rate] = nacelle_path[row, 1]
         if acceleration >= 0:
             stage_u[acceleration] = nacelle_path[row, 2]
-        i, j = _locate(tables, stage_x, nacelle_path[row, 0], work)
-        if every_stage or stage == 0:
-            _blend(tables.cells, i, j, 0, block, work)
-        else:
-            _blend(tables.cells, i, j, 0, reference, work)
-        _apply(tables, stage_x, stage_u, slope, work)
+        if refresh != REFRESH_ONCE:
+            i, j = _locate(tables, stage_x, nacelle_path[row, 0], work)
+            whole = refresh == REFRESH_EVERY_STAGE or stage == 0
+            _blend(tables.cells, i, j, block if whole else states + inputs + row_sums.shape[0], work, model)
+        _apply(tables, stage_x, stage_u, slope, reference, columns, deviation, row_sums)
         weight = 1.0 if stage == 0 or stage == 3 else 2.0
         ahead = dt if stage == 2 else 0.5 * dt
         for k in range(states):

@@ -16,6 +16,7 @@ from rtsim.units import GRAVITY
 
 FloatArray = npt.NDArray[np.float64]
 Form = Literal["layered", "stitched", "plain"]
+Refresh = Literal["step", "references", "stage"]
 
 FORMS: dict[Form, int] = {
     "layered": kernels.FORM_LAYERED,
@@ -23,18 +24,24 @@ FORMS: dict[Form, int] = {
     "plain": kernels.FORM_PLAIN,
 }
 """Forms of the LPV aircraft by the name that people use; the first is the default."""
+REFRESHES: dict[Refresh, int] = {
+    "step": kernels.REFRESH_ONCE,
+    "references": kernels.REFRESH_REFERENCE,
+    "stage": kernels.REFRESH_EVERY_STAGE,
+}
+"""How often a step interpolates; the difference is measured in docs/lpv.md."""
 KINEMATIC_TOLERANCE = 1e-3
 """Largest entry that may remain in the pitch and altitude rows after their kinematics are subtracted."""
 
 
-def prepare_tables(database: Database, form: Form = "layered", *, interpolate_matrices_once: bool = True) -> LpvTables:
+def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refresh = "step") -> LpvTables:
     """Pack a database for the kernels.
 
     Args:
         database: Trim map and linear models.
         form: ``layered`` (default), ``stitched`` or the paper's ``plain``.
-        interpolate_matrices_once: Interpolate the matrices once per step instead of in each Runge-Kutta stage; trim
-            state and input are always interpolated in each stage. The difference is measured in docs/lpv.md.
+        refresh: Interpolate once per ``step`` (default), the ``references`` in each Runge-Kutta stage and the matrices
+            once, or all in each ``stage``.
 
     Returns:
         The kernels' tables.
@@ -59,7 +66,7 @@ def prepare_tables(database: Database, form: Form = "layered", *, interpolate_ma
     padded = _padded(rows.size)
     roles[kernels.R_ROWS] = padded
     roles[kernels.R_OUTPUT_ROWS] = _padded(len(database.outputs))
-    roles[kernels.R_REFRESH] = kernels.REFRESH_REFERENCE if interpolate_matrices_once else kernels.REFRESH_EVERY_STAGE
+    roles[kernels.R_REFRESH] = REFRESHES[refresh]
     cells = np.concatenate(
         [
             x_ref,

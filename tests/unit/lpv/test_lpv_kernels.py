@@ -176,7 +176,7 @@ def test_outputs_equal_twin(toy_database, form, seed):
 
 def test_step_equals_twin_and_is_bit_reproducible(toy_database, form):
     rng = np.random.default_rng(5)
-    tables = prepare_tables(toy_database, form, interpolate_matrices_once=False)
+    tables = prepare_tables(toy_database, form, refresh="stage")
     work = np.zeros(kernels.work_size(tables))
     twin = NumpyLpv(toy_database, form)
     x, u, _ = flight_state(toy_database, rng, spread=0.3)
@@ -192,10 +192,11 @@ def test_step_equals_twin_and_is_bit_reproducible(toy_database, form):
     assert x.tobytes() == again.tobytes()
 
 
-def test_matrices_once_per_step_changes_little(toy_database):
+@pytest.mark.parametrize("refresh", ["step", "references"])
+def test_interpolating_once_per_step_changes_little(toy_database, refresh):
     ends = []
-    for once in (True, False):
-        tables = prepare_tables(toy_database, interpolate_matrices_once=once)
+    for how in (refresh, "stage"):
+        tables = prepare_tables(toy_database, refresh=how)
         work, path = np.zeros(kernels.work_size(tables)), np.zeros((3, 3))
         x, u = toy_database.x_ref[1, 6, 8].copy(), toy_database.u_ref[1, 6, 8].copy()
         u[1] += 0.02
