@@ -1,0 +1,186 @@
+"""One flight as a source of frames: simulation, scenario events and a pilot plug-in, stepped by whoever paces it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rtsim.command import Command, Pilot
+from rtsim.errors import InputError
+from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.simulation import Simulation
+from scenarios.pilots import PilotFactory
+from scenarios.scenario import PilotMode, ScenarioEvent
+from telemetry.log_format import LogEvent
+
+PILOT_WORDS: dict[PilotMode, str] = {
+    "mocm": "the MOCM pilot flies",
+    "external": "the pilot plug-in flies",
+    "hold": "the controls are held",
+}
+"""What a hand-over to each mode means, for people."""
+
+
+class FlightSession:
+    """Flies a simulation for a number of frames; implements ``rtsim.realtime.FrameSource``.
+
+    Everything that changes the flight from outside (a scenario's event, a key, a reset, a pilot that fails) becomes
+    an event with the number of the row before which it acts, which is all a replay needs.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        *,
+        frames: int,
+        events: Sequence[ScenarioEvent] = (),
+        pilot_factory: PilotFactory | None = None,
+        pilot_name: str = "mocm",
+        on_event: Callable[[LogEvent], None] | None = None,
+    ) -> None:
+        """Prepare a flight from the simulation's present state, which must be frame 0.
+
+        Args:
+            simulation: What flies.
+            frames: Length of the flight, counted from the last reset.
+            events: What the scenario makes happen, in order of time.
+            pilot_factory: Makes the pilot plug-in; None where the built-in pilot flies alone.
+            pilot_name: How the pilot is called in messages.
+            on_event: Told about every event.
+        """
+        self.simulation = simulation
+        self.rows = 0
+        """Rows flown so far, resets or not."""
+        self._frames = frames
+        self._due = [(max(0, math.ceil(event.time / simulation.dt - 1e-9)), event) for event in events]
+        self._next_due = 0
+        self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
+        self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
+        self._on_event = on_event
+        self._failure = ""
+
+    @property
+    def dt(self) -> float:
+        """Length of a frame [s]."""
+        return self.simulation.dt
+
+    @property
+    def finished(self) -> bool:
+        """Whether the flight is over: flown to its length, ended by itself, or its pilot failed."""
+        return bool(self._failure) or self.simulation.finished or self.simulation.frame_index >= self._frames
+
+    @property
+    def completed(self) -> bool:
+        """Whether it was flown to its length."""
+        return not self._failure and not self.simulation.finished and self.simulation.frame_index >= self._frames
+
+    @property
+    def end_reason(self) -> str:
+        """Why the flight is over, as a sentence without full stop."""
+        if self._failure:
+            return self._failure
+        if self.simulation.finished:
+            return self.simulation.end_reason
+        return f"flown to its end at {self._frames * self.dt:.1f} s"
+
+    def step(self) -> FloatArray:
+        """Fly one frame.
+
+        Returns:
+            Its row, shape (SIGNAL_COUNT,).
+        """
+        if self._next_due < len(self._due):
+            self._start_due_events()
+        command = None
+        if self._pilot is not None and self.simulation.mode == "external":
+            command = self._ask_pilot(self._pilot)
+        row = self.simulation.step(command)
+        self.rows += 1
+        return row
+
+    def run(self, frames: int) -> FloatArray:
+        """Fly several frames, in one compiled call where only built-in parts fly.
+
+        Args:
+            frames: How many at most.
+
+        Returns:
+            The rows, shape (flown, SIGNAL_COUNT).
+        """
+        frames = min(frames, self._frames - self.simulation.frame_index)
+        if self._next_due < len(self._due):
+            self._start_due_events()
+        if self._next_due < len(self._due):
+            frames = min(frames, self._due[self._next_due][0] - self.simulation.frame_index)
+        if self._pilot is None or self.simulation.mode != "external":
+            rows = self.simulation.run(frames)
+            self.rows += len(rows)
+            return rows
+        rows = np.empty((frames, SIGNAL_COUNT))
+        flown = 0
+        while flown < frames and not self.finished:
+            rows[flown] = self.step()
+            flown += 1
+        return rows[:flown]
+
+    def reset(self) -> None:
+        """Put the aircraft, its pilot and the scenario's events back to the start."""
+        self._tell("reset", "the flight starts again")
+        self.simulation.reset()
+        self._next_due = 0
+        if self._pilot_factory is not None:
+            self._pilot = self._pilot_factory()
+
+    def switch_pilot(self, pilot: str) -> None:
+        """Hand the controls over from the coming frame on.
+
+        Args:
+            pilot: ``mocm``, ``external`` (the plug-in), ``hold``, or ``next`` for the next one there is.
+
+        Raises:
+            InputError: If there is no such pilot in this flight.
+        """
+        available: list[PilotMode] = ["mocm", "hold"] if self._pilot is None else ["mocm", "external", "hold"]
+        present = self.simulation.mode
+        if pilot == "next":
+            pilot = available[(available.index(present) + 1) % len(available)]
+        for mode in available:
+            if mode == pilot:
+                self._tell("pilot", PILOT_WORDS[mode], {"mode": mode})
+                self.simulation.set_pilot(mode)
+                return
+        raise InputError(
+            "is not a pilot of this flight", key="pilot", value=pilot, allowed=", ".join(available), mend="choose one"
+        )
+
+    def _start_due_events(self) -> None:
+        frame = self.simulation.frame_index
+        while self._next_due < len(self._due) and self._due[self._next_due][0] <= frame:
+            event = self._due[self._next_due][1]
+            self._next_due += 1
+            self.switch_pilot(event.pilot)
+
+    def _ask_pilot(self, pilot: Pilot) -> Command | None:
+        """The plug-in's command; where it fails, the flight ends with the controls held for one last frame."""
+        simulation = self.simulation
+        try:
+            answer = pilot.step(simulation.sensors(), simulation.reference(), simulation.dt)
+            command = Command(float(answer.stick), float(answer.lever), float(answer.nacelle_rate))
+        except Exception as error:  # noqa: BLE001 - a user's own code may raise anything; the flight must end cleanly
+            problem = f"raised {type(error).__name__}: {error}"
+        else:
+            if math.isfinite(command.stick + command.lever + command.nacelle_rate):
+                return command
+            problem = f"gave a command that is not finite: {command}"
+        self._failure = f"the pilot {self._pilot_name} {problem}"
+        self._tell("pilot_failed", self._failure, level="warning")
+        self.switch_pilot("hold")
+        return None
+
+    def _tell(self, kind: str, text: str, data: dict[str, str] | None = None, *, level: str = "info") -> None:
+        if self._on_event is not None:
+            time = self.simulation.frame_index * self.dt
+            details = {"row": self.rows, **(data or {})}
+            self._on_event(LogEvent(self.simulation.frame_index, time, kind, text, level, details))
