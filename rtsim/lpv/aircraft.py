@@ -1,0 +1,267 @@
+"""The LPV aircraft as an object: trim, linear model, outputs and the compiled step, from a database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rtsim.aircraft.model import TrimPoint
+from rtsim.errors import InputError
+from rtsim.lpv import lpv_kernels as kernels
+from rtsim.lpv.database import Database, load_database
+from rtsim.lpv.tables import Form, Refresh, prepare_tables
+from rtsim.lpv.variables import position, required_position
+from rtsim.units import to_deg, to_kt
+
+if TYPE_CHECKING:
+    import control
+
+FloatArray = npt.NDArray[np.float64]
+
+TRIM_TOLERANCE = 1e-9
+"""Largest state derivative left by a trim of the LPV aircraft."""
+
+
+@dataclass(frozen=True, slots=True)
+class LpvAircraft:
+    """The quasi-LPV aircraft. SI and radians; the order of states, inputs and outputs is the database's."""
+
+    database: Database
+    """Trim map and linear models."""
+    form: Form = "layered"
+    """``layered`` (scheduled on airspeed, nacelle angle and angle of attack), ``stitched`` or the paper's ``plain``."""
+    refresh: Refresh = "step"
+    """How often a step interpolates, see ``rtsim.lpv.tables.REFRESHES``."""
+    tables: kernels.LpvTables = field(init=False, repr=False)
+    """What the compiled kernels take."""
+    _work: FloatArray = field(init=False, repr=False)
+    _path: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Pack the database for the kernels."""
+        tables = prepare_tables(self.database, self.form, refresh=self.refresh)
+        object.__setattr__(self, "tables", tables)
+        object.__setattr__(self, "_work", np.zeros(kernels.work_size(tables)))
+        object.__setattr__(self, "_path", np.zeros((3, 3)))
+
+    @property
+    def flags(self) -> int:
+        """Flags of the last derivative, output or step: 0 inside the grid, else bits ``lpv_kernels.FLAG_*``."""
+        return int(self._work[kernels.W_FLAGS])
+
+    def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
+        """State derivative.
+
+        Args:
+            x: Total state (nx,).
+            u: Total input (nu,), nacelle rate and acceleration included.
+            nacelle_angle: Nacelle angle [rad].
+
+        Returns:
+            The state derivative (nx,).
+        """
+        xdot = np.empty(x.size)
+        self._work[kernels.W_FLAGS] = 0.0
+        kernels.lpv_derivative(self.tables, x, u, nacelle_angle, xdot, self._work)
+        return xdot
+
+    def outputs(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
+        """Outputs.
+
+        Args:
+            x: Total state (nx,).
+            u: Total input (nu,), nacelle rate and acceleration included.
+            nacelle_angle: Nacelle angle [rad].
+
+        Returns:
+            The outputs (ny,).
+        """
+        y = np.empty(len(self.database.outputs))
+        self._work[kernels.W_FLAGS] = 0.0
+        kernels.lpv_outputs(self.tables, x, u, nacelle_angle, y, self._work)
+        return y
+
+    def step(
+        self,
+        x: FloatArray,
+        u: FloatArray,
+        *,
+        nacelle_angle: float,
+        nacelle_rate: float = 0.0,
+        nacelle_acceleration: float = 0.0,
+        dt: float = 0.004,
+    ) -> FloatArray:
+        """Advance by one fixed Runge-Kutta step.
+
+        Args:
+            x: Total state at the start (nx,).
+            u: Inputs held over the step (nu,); nacelle rate and acceleration are taken from the arguments below.
+            nacelle_angle: Nacelle angle at the start [rad].
+            nacelle_rate: Nacelle rate at the start [rad/s].
+            nacelle_acceleration: Nacelle acceleration over the step [rad/s^2].
+            dt: Length of the step [s].
+
+        Returns:
+            A new array: the state at the end (nx,). ``flags`` tells whether the grid was left.
+        """
+        end = x.copy()
+        kernels.lpv_step_steady(
+            self.tables, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt, self._work, self._path
+        )
+        return end
+
+    def trim(self, *, airspeed: float, nacelle: float, acceleration: float = 0.0) -> TrimPoint:
+        """Find the level-flight trim of the LPV aircraft itself; at grid points it is the database's.
+
+        Args:
+            airspeed: Horizontal airspeed, signed [m/s].
+            nacelle: Nacelle angle [rad].
+            acceleration: Level acceleration [m/s^2].
+
+        Returns:
+            The trim; ``converged`` is False where it did not close or the database has no trim there.
+
+        Raises:
+            InputError: Airspeed or nacelle angle outside the grid.
+        """
+        self._require_inside(airspeed, nacelle)
+        x, u, free = self._interpolated_trim(airspeed, nacelle, acceleration)
+        unknown = np.concatenate([np.flatnonzero(np.arange(x.size) != self._altitude()), x.size + free])
+        z = np.concatenate([x, u])
+        residual = self._trim_residual(z, airspeed, nacelle, acceleration)
+        for _ in range(20):
+            if np.max(np.abs(residual)) < TRIM_TOLERANCE:
+                break
+            jacobian = np.empty((residual.size, unknown.size))
+            for column, k in enumerate(unknown):
+                step = 1e-6 * max(1.0, abs(z[k]))
+                shifted = z.copy()
+                shifted[k] += step
+                jacobian[:, column] = (
+                    self._trim_residual(shifted, airspeed, nacelle, acceleration) - residual
+                ) / step
+            z[unknown] -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+            residual = self._trim_residual(z, airspeed, nacelle, acceleration)
+        x, u = z[: x.size].copy(), z[x.size :].copy()
+        xdot = self.derivative(x, u, nacelle)
+        inside = self.flags == 0
+        worst = float(np.max(np.abs(residual)))
+        return TrimPoint(x, u, self.outputs(x, u, nacelle), xdot, bool(inside and worst < 1e-6), worst)
+
+    def linearize(self, *, airspeed: float, nacelle: float) -> control.StateSpace:
+        """Linear model of level flight, interpolated between the grid points.
+
+        Args:
+            airspeed: Horizontal airspeed, signed [m/s].
+            nacelle: Nacelle angle [rad].
+
+        Returns:
+            The model with named states, inputs and outputs (``control.StateSpace``), in deviations from the trim.
+
+        Raises:
+            InputError: Airspeed or nacelle angle outside the grid.
+        """
+        import control
+
+        self._require_inside(airspeed, nacelle)
+        level = self.database.level_layer
+        A, B, C, D = (self._interpolate(getattr(self.database, name)[level], airspeed, nacelle) for name in "ABCD")
+        return control.StateSpace(
+            A, B, C, D,
+            states=[variable.name for variable in self.database.states],
+            inputs=[variable.name for variable in self.database.inputs],
+            outputs=[variable.name for variable in self.database.outputs],
+            name=f"{to_kt(airspeed):.0f} kn, nacelle {to_deg(nacelle):.1f} deg",
+        )  # fmt: skip
+
+    def is_valid(self, *, airspeed: float, nacelle: float) -> bool:
+        """Whether all grid points around a condition have a level trim.
+
+        Args:
+            airspeed: Horizontal airspeed, signed [m/s].
+            nacelle: Nacelle angle [rad].
+        """
+        d = self.database
+        if not (d.airspeed[0] <= airspeed <= d.airspeed[-1] and d.nacelle[0] <= nacelle <= d.nacelle[-1]):
+            return False
+        return bool(self._interpolate(d.valid[d.level_layer].astype(float), airspeed, nacelle) > 1.0 - 1e-9)
+
+    def _altitude(self) -> int:
+        return position(self.database.states, "altitude")
+
+    def _interpolate(self, array: FloatArray, airspeed: float, nacelle: float) -> FloatArray:
+        """Bilinear interpolation of an array with leading axes [airspeed, nacelle]."""
+        d = self.database
+        (i, s), (j, t) = _cell(d.airspeed, airspeed), _cell(d.nacelle, nacelle)
+        near = (1.0 - t) * array[i, j] + t * array[i, j + 1]
+        far = (1.0 - t) * array[i + 1, j] + t * array[i + 1, j + 1]
+        return np.asarray((1.0 - s) * near + s * far)
+
+    def _interpolated_trim(
+        self, airspeed: float, nacelle: float, acceleration: float
+    ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.int64]]:
+        """Starting values of the trim, and the inputs that trims of this database use."""
+        d = self.database
+        free = np.flatnonzero(np.ptp(d.u_ref[d.valid], axis=0) > 0.0)
+        if d.layer_acceleration.size == 1:
+            layer, share = 0, 0.0
+        else:
+            layer, share = _cell(d.layer_acceleration, acceleration)
+        parts = []
+        for array in (d.x_ref, d.u_ref):
+            near = self._interpolate(array[layer], airspeed, nacelle)
+            far = near if share == 0.0 else self._interpolate(array[layer + 1], airspeed, nacelle)
+            parts.append((1.0 - share) * near + share * far)
+        return parts[0], parts[1], free
+
+    def _trim_residual(self, z: FloatArray, airspeed: float, nacelle: float, acceleration: float) -> FloatArray:
+        """State derivative minus the wanted one, and the airspeed that is missing."""
+        d = self.database
+        nx = len(d.states)
+        x, u = z[:nx], z[nx:]
+        iu, iw, ip = (required_position(d.states, name, "trim") for name in ("u", "w", "pitch"))
+        rest = self.derivative(x, u, nacelle)
+        rest[iu] -= acceleration * np.cos(x[ip])
+        rest[iw] -= acceleration * np.sin(x[ip])
+        return np.append(rest, x[iu] * np.cos(x[ip]) + x[iw] * np.sin(x[ip]) - airspeed)
+
+    def _require_inside(self, airspeed: float, nacelle: float) -> None:
+        d = self.database
+        for name, value, axis, shown, unit in (
+            ("airspeed", airspeed, d.airspeed, to_kt, "kn"),
+            ("nacelle", nacelle, d.nacelle, to_deg, "deg"),
+        ):
+            slack = 1e-9 * (axis[-1] - axis[0])
+            if not axis[0] - slack <= value <= axis[-1] + slack:
+                raise InputError(
+                    "outside the database",
+                    key=name,
+                    value=f"{shown(value):g} {unit}",
+                    allowed=f"{shown(axis[0]):g} to {shown(axis[-1]):g} {unit}",
+                )
+
+
+def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
+    """Number of the interval that holds a value, and where in it, clipped to the axis."""
+    k = int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
+    return k, float(np.clip((value - axis[k]) / (axis[k + 1] - axis[k]), 0.0, 1.0))
+
+
+def load_aircraft(path: str | Path | None = None, **options: Any) -> LpvAircraft:
+    """Load the LPV aircraft; without a path, the shipped XV-15.
+
+    Args:
+        path: A database file (``.nc`` or ``.mat``).
+        **options: ``form`` and ``refresh`` of ``LpvAircraft``.
+
+    Returns:
+        The aircraft.
+
+    Raises:
+        InputError: The file cannot be read or is not a usable database.
+    """
+    return LpvAircraft(load_database(path), **options)
