@@ -107,3 +107,8 @@ def test_an_undocumented_argument_would_be_found():
         "sample: argument second is not described",
         "sample: describes third, which it does not take",
     ]
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_every_public_name_exists(package):
+    assert [name for name in getattr(package, "__all__", []) if not hasattr(package, name)] == []

@@ -21,6 +21,7 @@ LAYERS = (
     ("rtsim.nacelle",),
     ("rtsim.pilot",),
     ("rtsim.simulation_kernels",),
+    ("rtsim.simulation_setup",),
     ("rtsim.simulation",),
     ("rtsim.realtime",),
     ("scenarios",),
