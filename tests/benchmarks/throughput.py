@@ -3,8 +3,8 @@
     python -m tests.benchmarks.throughput [--repeats 5] [--json]
 
 Every row is measured ``--repeats`` times, the rows taking turns so that a busy minute of the machine touches all of
-them; best and median are shown. JSBSim comes from PyPI (``pip install -e '.[benchmark]'``); without it its rows are left
-out, and said so.
+them; best and median are shown. JSBSim comes from PyPI (``pip install -e '.[benchmark]'``); without it its rows are
+left out, and said so.
 """
 
 from __future__ import annotations
