@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +60,9 @@ OUTPUTS: tuple[Variable, ...] = (
 _States = namedtuple("_States", [v.name for v in STATES])  # type: ignore[misc]
 _Inputs = namedtuple("_Inputs", [v.name for v in INPUTS])  # type: ignore[misc]
 _Outputs = namedtuple("_Outputs", [v.name for v in OUTPUTS])  # type: ignore[misc]
-STATE = _States(*range(len(STATES)))
+STATE: Any = _States(*range(len(STATES)))
 """Index of a state by name, usable in compiled kernels."""
-INPUT = _Inputs(*range(len(INPUTS)))
+INPUT: Any = _Inputs(*range(len(INPUTS)))
 """Index of an input by name."""
-OUTPUT = _Outputs(*range(len(OUTPUTS)))
+OUTPUT: Any = _Outputs(*range(len(OUTPUTS)))
 """Index of an output by name."""
