@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from rtsim import simulation_kernels as kernels
+from rtsim.aids import AIDS, AidName
 from rtsim.aircraft.signals import INPUT, STATE
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
@@ -25,9 +26,11 @@ MODES: dict[PilotMode, int] = {
 """Pilot modes by name, with their number in the ``pilot_mode`` column."""
 END_REASONS = {
     kernels.END_NONE: "",
-    kernels.END_GROUND: "the aircraft reached the ground",
+    kernels.END_CRASH: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
     kernels.END_ATTITUDE: "control was lost: pitch attitude beyond 80 deg",
     kernels.END_NOT_FINITE: "the model diverged: a state is no longer a finite number",
+    kernels.END_GENTLE_LANDING: "touched down gently, sinking at {sink:.1f} m/s",
+    kernels.END_HARD_LANDING: "landed hard, sinking at {sink:.1f} m/s",
 }
 """Why a flight ended by itself, by the code in the simulation's clock."""
 
@@ -95,7 +98,8 @@ class Simulation:
     @property
     def end_reason(self) -> str:
         """Why the flight ended by itself; empty while it has not."""
-        return END_REASONS[int(self._state.clock[kernels.CLOCK_END])]
+        clock = self._state.clock
+        return END_REASONS[int(clock[kernels.CLOCK_END])].format(sink=float(clock[kernels.CLOCK_SINK]))
 
     @property
     def mode(self) -> PilotMode:
@@ -250,6 +254,25 @@ class Simulation:
         self._state.clock[kernels.CLOCK_MODE] = MODES[mode]
         if self._observed:
             self._row[COLUMN.pilot_mode] = MODES[mode]
+
+    @property
+    def aids(self) -> tuple[AidName, ...]:
+        """The pilot aids that are on."""
+        return tuple(name for name, place in AIDS.items() if self._state.switches[place] != 0.0)
+
+    def set_aid(self, name: AidName, on: bool) -> None:
+        """Switch a pilot aid from this frame on; no control steps.
+
+        Args:
+            name: One of ``rtsim.aids.AIDS``.
+            on: On or off.
+
+        Raises:
+            InputError: There is no such aid.
+        """
+        if name not in AIDS:
+            raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(AIDS))
+        self._state.switches[AIDS[name]] = 1.0 if on else 0.0
 
     def snapshot(self) -> Snapshot:
         """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""

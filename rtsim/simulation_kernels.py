@@ -14,6 +14,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aids.aids_kernels import LAST_SWITCHES, AidTables, aids_step
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.aircraft.tables import AircraftTables
@@ -46,13 +47,20 @@ PLANT_LPV, PLANT_NONLINEAR = 0, 1
 MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
 
 # Places in SimulationState.clock.
-CLOCK_FRAME, CLOCK_MODE, CLOCK_DISTANCE, CLOCK_FLAGS, CLOCK_END = 0, 1, 2, 3, 4
-CLOCK_SIZE = 5
+CLOCK_FRAME, CLOCK_MODE, CLOCK_DISTANCE, CLOCK_FLAGS, CLOCK_END, CLOCK_SINK = 0, 1, 2, 3, 4, 5
+CLOCK_SIZE = 6
 # Places in SimulationState.reference: unfiltered airspeed command is a function of time and not kept.
 REFERENCE_AIRSPEED, REFERENCE_RATE = 0, 1
 REFERENCE_SIZE = 2
 # Why a flight ended by itself.
-END_NONE, END_GROUND, END_ATTITUDE, END_NOT_FINITE = 0, 1, 2, 3
+END_NONE, END_CRASH, END_ATTITUDE, END_NOT_FINITE, END_GENTLE_LANDING, END_HARD_LANDING = 0, 1, 2, 3, 4, 5
+GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
+"""Sink rates at touchdown up to which a landing counts as gentle or as hard [m/s]; beyond it is a crash. Ours: about
+300 and 600 ft/min, the usual normal and limit touchdown rates of helicopters (14 CFR 29.725 drops at 6.5 ft/s)."""
+LANDING_PITCH = 15.0 * DEGREE
+LANDING_NACELLE = 60.0 * DEGREE
+"""Below this nacelle angle the proprotors (12.5 ft radius) would strike the ground."""
+LANDING_SPEED = 60.0 * KNOT
 LARGEST_PITCH = 80.0 * DEGREE
 TRANSMISSION_EFFICIENCY = 0.93
 # The array handed to the pilot, see rtsim.pilot.pilot_kernels.
@@ -78,6 +86,8 @@ class SimulationTables(NamedTuple):
     """Boundaries and levels."""
     pilot: PilotTables
     """The MOCM's gains and references."""
+    aids: AidTables
+    """Schedules of the pilot aids; they act on every pilot but the MOCM, which is designed for the bare aircraft."""
     programme: FloatArray
     """Rows: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
     reference_frequency: float
@@ -99,8 +109,12 @@ class SimulationState(NamedTuple):
     """Corridor level timers."""
     pilot: FloatArray
     """State of the MOCM."""
+    aids: FloatArray
+    """State of the pilot aids."""
+    switches: FloatArray
+    """Which aids are on."""
     clock: FloatArray
-    """Frame number, pilot mode, distance flown [m], LPV flags, end code."""
+    """Frame number, pilot mode, distance flown [m], LPV flags, end code, sink rate at the end [m/s]."""
 
 
 class Scratch(NamedTuple):
@@ -122,6 +136,8 @@ class Scratch(NamedTuple):
     """What the pilot is asked for."""
     command: FloatArray
     """Stick, lever, nacelle rate."""
+    hands: FloatArray
+    """Stick and lever after protection, before the aids."""
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -254,6 +270,30 @@ def pilot_command(
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _end_code(tables: SimulationTables, state: SimulationState) -> int:
+    """Whether the flight is over, and how; a landing is judged by sink rate, attitude, speed and rotor clearance."""
+    x = state.x
+    for i in range(x.shape[0]):
+        if not math.isfinite(x[i]):
+            return END_NOT_FINITE
+    pitch = x[STATE.pitch]
+    if x[STATE.altitude] < 0.0:
+        st, ct = math.sin(pitch), math.cos(pitch)
+        sink = x[STATE.w] * ct - x[STATE.u] * st
+        state.clock[CLOCK_SINK] = sink
+        ground_speed = x[STATE.u] * ct + x[STATE.w] * st + tables.wind
+        upright = (
+            abs(pitch) <= LANDING_PITCH and state.nacelle[1] >= LANDING_NACELLE and abs(ground_speed) <= LANDING_SPEED
+        )
+        if upright and sink <= GENTLE_SINK_RATE:
+            return END_GENTLE_LANDING
+        if upright and sink <= HARD_SINK_RATE:
+            return END_HARD_LANDING
+        return END_CRASH
+    return END_ATTITUDE if abs(pitch) > LARGEST_PITCH else END_NONE
+
+
+@numba.njit(cache=True, error_model="numpy")
 def advance(
     tables: SimulationTables,
     state: SimulationState,
@@ -274,15 +314,24 @@ def advance(
     dt = tables.dt
     x, u = state.x, state.u
     angle = scratch.motion[0]
-    stick = min(max(applied[0], -1.0), 1.0)
-    lever = min(max(applied[1], 0.0), 1.0)
+    acting = scratch.command
+    scratch.hands[0] = min(max(applied[0], -1.0), 1.0)
+    scratch.hands[1] = min(max(applied[1], 0.0), 1.0)
+    if state.clock[CLOCK_MODE] == MODE_MOCM:
+        acting[0], acting[1] = scratch.hands[0], scratch.hands[1]
+        # Whoever takes over later finds the aids to be engaged anew.
+        state.aids[LAST_SWITCHES] = -1.0
+    else:
+        acting[0], acting[1] = u[INPUT.stick], u[INPUT.lever]
+        aids_step(tables.aids, state.aids, state.switches, x, angle, scratch.hands, acting, dt)
+    stick, lever = acting[0], acting[1]
     rate = nacelle_effective_rate(tables.nacelle, state.nacelle, nacelle_assigned_rate(tables.nacelle, applied[2]), dt)
     margin = min(scratch.margins[0], scratch.margins[1])
     controls = tables.aircraft.controls
     cyclic_stop = abs(x[STATE.cyclic_1s]) >= controls.cyclic_limit * (1.0 - 1e-9)
     elevator_stop = abs(x[STATE.elevator]) >= controls.elevator_limit * (1.0 - 1e-9)
-    stick_stop = abs(applied[0]) >= 1.0
-    lever_stop = applied[1] <= 0.0 or applied[1] >= 1.0
+    stick_stop = abs(stick) >= 1.0
+    lever_stop = lever <= 0.0 or lever >= 1.0
     row[COLUMN.stick] = stick
     row[COLUMN.lever] = lever
     row[COLUMN.pilot_stick] = asked[0]
@@ -292,20 +341,8 @@ def advance(
     row[COLUMN.corridor_level] = float(corridor_level_step(tables.corridor, margin, dt, state.level))
     row[COLUMN.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
 
-    scratch.command[0] = stick
-    scratch.command[1] = lever
     if state.clock[CLOCK_MODE] == MODE_MOCM:
-        mocm_advance(
-            tables.pilot,
-            state.pilot,
-            x,
-            angle,
-            scratch.motion[1],
-            scratch.target,
-            scratch.command,
-            noise,
-            dt,
-        )
+        mocm_advance(tables.pilot, state.pilot, x, angle, scratch.motion[1], scratch.target, acting, noise, dt)
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = stick
     u[INPUT.lever] = lever
@@ -328,15 +365,7 @@ def advance(
     state.reference[0] = value
     state.reference[1] = value_rate
     state.clock[CLOCK_FRAME] += 1.0
-    finite = True
-    for i in range(x.shape[0]):
-        finite = finite and math.isfinite(x[i])
-    if not finite:
-        state.clock[CLOCK_END] = END_NOT_FINITE
-    elif x[STATE.altitude] < 0.0:
-        state.clock[CLOCK_END] = END_GROUND
-    elif abs(x[STATE.pitch]) > LARGEST_PITCH:
-        state.clock[CLOCK_END] = END_ATTITUDE
+    state.clock[CLOCK_END] = _end_code(tables, state)
 
 
 @numba.njit(cache=True, error_model="numpy")

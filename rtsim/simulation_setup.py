@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 
 from rtsim import simulation_kernels as kernels
+from rtsim.aids import AidName, design_aids, switches_of
+from rtsim.aids.aids_kernels import AID_STATE_SIZE, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.corridor import load_corridor
@@ -26,7 +28,7 @@ from rtsim.units import to_deg, to_kt
 Plant = Literal["lpv", "lpv-plain", "nonlinear"]
 PLANT_FORMS: dict[Plant, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
 REFERENCE_FREQUENCY = 1.5
-"""Natural frequency of the airspeed reference filter [rad/s] (design.md)."""
+"""Natural frequency of the airspeed reference filter [rad/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +59,8 @@ class FlightSetup:
     """Root of every random stream."""
     pilot_noise: bool = False
     """Let the MOCM's observation and motor noise act."""
+    aids: tuple[AidName, ...] = ()
+    """Pilot aids on at frame 0; they act on every pilot but the MOCM."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +126,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         nacelle=load_nacelle_tables(),
         corridor=load_corridor(setup.corridor).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
+        aids=design_aids(database),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         reference_frequency=REFERENCE_FREQUENCY,
     )
@@ -136,6 +141,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         margins=np.zeros(MARGIN_COUNT),
         target=np.zeros(kernels.TARGET_SIZE),
         command=np.zeros(3),
+        hands=np.zeros(2),
     )
     return Parts(
         tables=tables,
@@ -166,8 +172,12 @@ def start_state(setup: FlightSetup, parts: Parts) -> kernels.SimulationState:
         reference=np.array([airspeed, 0.0]),
         level=new_level_state(),
         pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
+        aids=np.zeros(AID_STATE_SIZE),
+        switches=switches_of(setup.aids),
         clock=clock,
     )
+    if setup.aids:
+        state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
     row = np.zeros(len(kernels.COLUMN))
     kernels.observe(parts.tables, state, parts.scratch, row)
     kernels.engage_pilot(parts.tables, state, parts.scratch)

@@ -1,0 +1,261 @@
+"""Compiled pilot aids: what acts between the pilot's hands and the control mixing.
+
+Signs: stick forward (positive) pitches down, so a positive gain on pitch and pitch rate is restoring. Gains are
+accelerations wanted over accelerations the controls give (``design.py``), so one handling target holds everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+
+from rtsim.aircraft.signals import STATE
+from rtsim.frame import FloatArray
+
+# Places in the switches; 1 on, 0 off.
+RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4
+AID_COUNT = 5
+# Places in the state.
+PITCH_REFERENCE, ALTITUDE_REFERENCE, AIRSPEED_REFERENCE = 0, 1, 2
+ALTITUDE_INTEGRAL, AIRSPEED_INTEGRAL, SCHEDULE_AIRSPEED = 3, 4, 5
+LEVER_REFERENCE, STICK_OFFSET, LEVER_OFFSET, LAST_SWITCHES = 6, 7, 8, 9
+AID_STATE_SIZE = LAST_SWITCHES + AID_COUNT
+# Layers of AidTables.maps.
+MAP_STICK, MAP_PITCH_SENSITIVITY, MAP_PITCH_DAMPING, MAP_LEVER_LIFT, MAP_LEVER_THRUST = 0, 1, 2, 3, 4
+MAP_COUNT = 5
+
+CLIMB_PER_HEIGHT = 0.2
+"""Climb rate asked for per height error in airplane mode [1/s]."""
+
+
+class AidTables(NamedTuple):
+    """Schedules and targets of the aids. SI and radians."""
+
+    airspeed: FloatArray
+    """Airspeed axis [m/s]."""
+    nacelle: FloatArray
+    """Nacelle axis [rad]."""
+    maps: FloatArray
+    """Trim stick, pitch acceleration per stick and per pitch rate, climb and forward acceleration per lever; (5, V, N)."""
+    schedule_time: float
+    """Time constant of the airspeed that schedules the aids [s]."""
+    damping: float
+    """Pitch damping the rate damper aims at [1/s]."""
+    attitude_frequency: float
+    """Natural frequency of attitude retention [rad/s]."""
+    attitude_damping: float
+    """Damping ratio of attitude retention."""
+    authority: float
+    """Largest part of the stick the damper and the retention may add."""
+    rate_command: float
+    """Pitch rate commanded by full stick with attitude retention on [rad/s]."""
+    dead_zone: float
+    """Stick and lever deflections below this leave the references alone."""
+    altitude_frequency: float
+    """Natural frequency of altitude hold [rad/s]."""
+    airspeed_frequency: float
+    """Bandwidth of airspeed hold [rad/s]."""
+    integral_time: float
+    """Time constant of both holds' integrals [s]."""
+    fade_time: float
+    """Time in which what a switched aid added fades from or into the hands' part [s]."""
+    blend: tuple[float, float]
+    """Nacelle angles between which altitude passes from stick (airplane) to lever (helicopter) [rad]."""
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
+    low = 0
+    high = axis.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if axis[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    share = (value - axis[low]) / (axis[low + 1] - axis[low])
+    return low, min(max(share, 0.0), 1.0)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) -> float:
+    """Value of one map at a flight condition, bilinear and held outside the grid.
+
+    Args:
+        tables: The aids.
+        which: Number of the map.
+        airspeed: Airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+    """
+    i, s = _cell(tables.airspeed, airspeed)
+    j, t = _cell(tables.nacelle, nacelle)
+    m = tables.maps
+    return (1.0 - s) * ((1.0 - t) * m[which, i, j] + t * m[which, i, j + 1]) + s * (
+        (1.0 - t) * m[which, i + 1, j] + t * m[which, i + 1, j + 1]
+    )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _beyond(value: float, dead_zone: float) -> float:
+    """The part of a deflection beyond the dead zone, rescaled to full travel."""
+    if abs(value) <= dead_zone:
+        return 0.0
+    return math.copysign((abs(value) - dead_zone) / (1.0 - dead_zone), value)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _limited(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _terms(
+    tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray
+) -> tuple[float, float, float, float]:
+    """Stick and lever with the aids as switched, and the two hold errors (altitude [m], airspeed [m/s])."""
+    pitch, q = x[STATE.pitch], x[STATE.q]
+    st, ct = math.sin(pitch), math.cos(pitch)
+    airspeed = x[STATE.u] * ct + x[STATE.w] * st
+    climb = x[STATE.u] * st - x[STATE.w] * ct
+    at = state[SCHEDULE_AIRSPEED]
+    start, end = tables.blend
+    share = min(max((nacelle - start) / (end - start), 0.0), 1.0)
+    share = share * share * (3.0 - 2.0 * share)
+    height_error = state[ALTITUDE_REFERENCE] - x[STATE.altitude]
+    speed_error = state[AIRSPEED_REFERENCE] - airspeed
+
+    lever = hands[1]
+    pitch_wanted = state[PITCH_REFERENCE]
+    if switches[ALTITUDE_HOLD] != 0.0:
+        w = tables.altitude_frequency
+        wanted = w * w * height_error - 1.6 * w * climb + state[ALTITUDE_INTEGRAL]
+        wanted = _limited(wanted, 2.5)
+        lift = max(scheduled(tables, MAP_LEVER_LIFT, at, nacelle), 4.0)
+        lever = state[LEVER_REFERENCE] + share * wanted / lift
+        # In airplane mode the path follows pitch: climb rate wanted over speed is the change of pitch.
+        remembered = state[ALTITUDE_INTEGRAL] / (w * w)
+        slope = (CLIMB_PER_HEIGHT * (height_error + remembered) - climb) / max(abs(airspeed), 20.0)
+        pitch_wanted += (1.0 - share) * _limited(slope, 0.12)
+    if switches[AIRSPEED_HOLD] != 0.0:
+        wanted = tables.airspeed_frequency * speed_error + state[AIRSPEED_INTEGRAL]
+        wanted = _limited(wanted, 1.5)
+        pitch_wanted -= share * wanted / 9.81
+        thrust = max(scheduled(tables, MAP_LEVER_THRUST, at, nacelle), 10.0)
+        if switches[ALTITUDE_HOLD] == 0.0:
+            lever = state[LEVER_REFERENCE] * (1.0 - share) + lever * share
+        lever += (1.0 - share) * wanted / thrust
+
+    sensitivity = min(scheduled(tables, MAP_PITCH_SENSITIVITY, at, nacelle), -0.3)
+    natural = min(scheduled(tables, MAP_PITCH_DAMPING, at, nacelle), 0.0)
+    stick = hands[0]
+    if switches[TRIM_BIAS] != 0.0:
+        stick += scheduled(tables, MAP_STICK, at, nacelle)
+    attitude = switches[ATTITUDE_RETENTION] + switches[ALTITUDE_HOLD] * (1.0 - share) + switches[AIRSPEED_HOLD] * share
+    added = 0.0
+    if attitude > 0.0:
+        w = tables.attitude_frequency
+        rate_wanted = -tables.rate_command * _beyond(hands[0], tables.dead_zone)
+        damping = max(2.0 * tables.attitude_damping * w + natural, 0.0)
+        added = (w * w * (pitch_wanted - pitch) + damping * (rate_wanted - q)) / sensitivity
+        # The hands command the rate through the reference; their direct part would act twice.
+        stick -= hands[0]
+    elif switches[RATE_DAMPING] != 0.0:
+        added = -max(tables.damping + natural, 0.0) * q / sensitivity
+    return stick + _limited(added, tables.authority), lever, height_error, speed_error
+
+
+@numba.njit(cache=True, error_model="numpy")
+def aids_engage(
+    tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray, acting: FloatArray
+) -> None:
+    """Start or re-start the aids from the present flight so that the acting controls do not step.
+
+    Args:
+        tables: The aids.
+        state: Their state; overwritten.
+        switches: Which are on.
+        x: Aircraft state.
+        nacelle: Nacelle angle [rad].
+        hands: Stick and lever as the pilot holds them.
+        acting: Stick and lever that acted last.
+    """
+    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
+    state[PITCH_REFERENCE] = x[STATE.pitch]
+    state[ALTITUDE_REFERENCE] = x[STATE.altitude]
+    state[AIRSPEED_REFERENCE] = airspeed
+    state[ALTITUDE_INTEGRAL] = 0.0
+    state[AIRSPEED_INTEGRAL] = 0.0
+    state[SCHEDULE_AIRSPEED] = airspeed
+    state[LEVER_REFERENCE] = acting[1]
+    stick, lever, _, _ = _terms(tables, state, switches, x, nacelle, hands)
+    state[STICK_OFFSET] = acting[0] - stick
+    state[LEVER_OFFSET] = acting[1] - lever
+    for i in range(AID_COUNT):
+        state[LAST_SWITCHES + i] = switches[i]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def aids_step(
+    tables: AidTables,
+    state: FloatArray,
+    switches: FloatArray,
+    x: FloatArray,
+    nacelle: float,
+    hands: FloatArray,
+    acting: FloatArray,
+    dt: float,
+) -> None:
+    """Turn the hands' stick and lever into the controls that act over the coming frame.
+
+    A change of a switch captures the present attitude, height and speed; what then differs from the controls that acted
+    last is kept as an offset that fades away, so no control steps.
+
+    Args:
+        tables: The aids.
+        state: Their state, updated in place.
+        switches: Which are on, shape (AID_COUNT,).
+        x: Aircraft state.
+        nacelle: Nacelle angle [rad].
+        hands: Stick and lever after protection.
+        acting: In: stick and lever that acted last; out: those that act now.
+        dt: Length of the frame [s].
+    """
+    changed = False
+    for i in range(AID_COUNT):
+        changed = changed or switches[i] != state[LAST_SWITCHES + i]
+    if changed:
+        aids_engage(tables, state, switches, x, nacelle, hands, acting)
+    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
+    state[SCHEDULE_AIRSPEED] += dt / tables.schedule_time * (airspeed - state[SCHEDULE_AIRSPEED])
+    stick, lever, height_error, speed_error = _terms(tables, state, switches, x, nacelle, hands)
+    stick += state[STICK_OFFSET]
+    lever += state[LEVER_OFFSET]
+    acting[0] = _limited(stick, 1.0)
+    acting[1] = min(max(lever, 0.0), 1.0)
+    fade = dt / tables.fade_time
+    state[STICK_OFFSET] -= fade * state[STICK_OFFSET]
+    state[LEVER_OFFSET] -= fade * state[LEVER_OFFSET]
+
+    start, end = tables.blend
+    helicopter = nacelle > 0.5 * (start + end)
+    pushed = _beyond(hands[0], tables.dead_zone)
+    moved = _beyond(hands[1] - state[LEVER_REFERENCE], 2.0 * tables.dead_zone)
+    if switches[AIRSPEED_HOLD] != 0.0:
+        state[AIRSPEED_REFERENCE] += dt * 1.5 * (pushed if helicopter else moved)
+        free = abs(speed_error) < 5.0
+        if free:
+            gain = tables.airspeed_frequency / tables.integral_time
+            state[AIRSPEED_INTEGRAL] = _limited(state[AIRSPEED_INTEGRAL] + dt * gain * speed_error, 1.5)
+    if switches[ALTITUDE_HOLD] != 0.0:
+        state[ALTITUDE_REFERENCE] += dt * 5.0 * (moved if helicopter else -pushed)
+        if abs(height_error) < 20.0:
+            gain = tables.altitude_frequency**2 / tables.integral_time
+            state[ALTITUDE_INTEGRAL] = _limited(state[ALTITUDE_INTEGRAL] + dt * gain * height_error, 2.0)
+    held_by_hold = (switches[AIRSPEED_HOLD] != 0.0 and helicopter) or (switches[ALTITUDE_HOLD] != 0.0 and not helicopter)
+    if not held_by_hold:
+        state[PITCH_REFERENCE] -= dt * tables.rate_command * pushed
+    # The reference never runs away from an attitude the aircraft cannot follow.
+    window = 8.0 * math.pi / 180.0
+    state[PITCH_REFERENCE] = x[STATE.pitch] + _limited(state[PITCH_REFERENCE] - x[STATE.pitch], window)

@@ -1,0 +1,101 @@
+"""Schedules of the pilot aids, from the level layer of the LPV database; and the aids by name."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+
+from rtsim.aids.aids_kernels import (
+    AID_COUNT,
+    AIRSPEED_HOLD,
+    ALTITUDE_HOLD,
+    ATTITUDE_RETENTION,
+    MAP_COUNT,
+    MAP_LEVER_LIFT,
+    MAP_LEVER_THRUST,
+    MAP_PITCH_DAMPING,
+    MAP_PITCH_SENSITIVITY,
+    MAP_STICK,
+    RATE_DAMPING,
+    TRIM_BIAS,
+    AidTables,
+)
+from rtsim.frame import FloatArray
+from rtsim.lpv.database import Database
+from rtsim.units import deg
+
+AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
+AIDS: dict[AidName, int] = {
+    "rate_damping": RATE_DAMPING,
+    "attitude_retention": ATTITUDE_RETENTION,
+    "altitude_hold": ALTITUDE_HOLD,
+    "airspeed_hold": AIRSPEED_HOLD,
+    "trim_bias": TRIM_BIAS,
+}
+"""Aids by name, with their place in the switches."""
+RIGID_BODY = ("u", "w", "q", "pitch")
+
+
+def design_aids(database: Database) -> AidTables:
+    """Make the aids' schedules: what the controls do at each grid point once rotor and actuators have settled.
+
+    Args:
+        database: The LPV database.
+    """
+    names = [variable.name for variable in database.states]
+    inputs = [variable.name for variable in database.inputs]
+    slow = [names.index(name) for name in RIGID_BODY]
+    fast = [i for i, name in enumerate(names) if name not in (*RIGID_BODY, "altitude")]
+    level = database.level_layer
+    shape = (len(database.airspeed), len(database.nacelle))
+    maps = np.zeros((MAP_COUNT, *shape))
+    for i, j in np.ndindex(shape):
+        reduced_a, reduced_b = _settled(database.A[level, i, j], database.B[level, i, j], slow, fast)
+        pitch = database.x_ref[level, i, j, names.index("pitch")]
+        stick, lever = inputs.index("stick"), inputs.index("lever")
+        maps[MAP_STICK, i, j] = database.u_ref[level, i, j, stick]
+        maps[MAP_PITCH_SENSITIVITY, i, j] = reduced_b[2, stick]
+        maps[MAP_PITCH_DAMPING, i, j] = reduced_a[2, 2]
+        maps[MAP_LEVER_LIFT, i, j] = math.sin(pitch) * reduced_b[0, lever] - math.cos(pitch) * reduced_b[1, lever]
+        maps[MAP_LEVER_THRUST, i, j] = math.cos(pitch) * reduced_b[0, lever] + math.sin(pitch) * reduced_b[1, lever]
+    return AidTables(
+        airspeed=database.airspeed,
+        nacelle=database.nacelle,
+        maps=maps,
+        schedule_time=2.0,
+        damping=1.5,
+        attitude_frequency=1.5,
+        attitude_damping=0.8,
+        authority=0.5,
+        rate_command=deg(10.0),
+        dead_zone=0.03,
+        altitude_frequency=0.5,
+        airspeed_frequency=0.25,
+        integral_time=10.0,
+        fade_time=1.0,
+        blend=(deg(30.0), deg(60.0)),
+    )
+
+
+def _settled(A: FloatArray, B: FloatArray, slow: list[int], fast: list[int]) -> tuple[FloatArray, FloatArray]:
+    """Residualise the fast states."""
+    inner = A[np.ix_(fast, fast)]
+    back = A[np.ix_(slow, fast)]
+    return (
+        A[np.ix_(slow, slow)] - back @ np.linalg.solve(inner, A[np.ix_(fast, slow)]),
+        B[slow] - back @ np.linalg.solve(inner, B[fast]),
+    )
+
+
+def switches_of(names: tuple[AidName, ...]) -> FloatArray:
+    """Switch positions with the named aids on.
+
+    Args:
+        names: Aids to switch on.
+    """
+    switches = np.zeros(AID_COUNT)
+    for name in names:
+        switches[AIDS[name]] = 1.0
+    return switches
