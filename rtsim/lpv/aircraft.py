@@ -141,9 +141,7 @@ class LpvAircraft:
                 step = 1e-6 * max(1.0, abs(z[k]))
                 shifted = z.copy()
                 shifted[k] += step
-                jacobian[:, column] = (
-                    self._trim_residual(shifted, airspeed, nacelle, acceleration) - residual
-                ) / step
+                jacobian[:, column] = (self._trim_residual(shifted, airspeed, nacelle, acceleration) - residual) / step
             z[unknown] -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
             residual = self._trim_residual(z, airspeed, nacelle, acceleration)
         x, u = z[: x.size].copy(), z[x.size :].copy()

@@ -2,7 +2,7 @@
 
 The trim map folds at stall, where two trims exist. A point is therefore only solved from a solved neighbour, and only
 accepted if it lies close to it: the helicopter side starts from hover, the airplane side from the fast downstop row.
-Each side, then each nacelle row, is one task of fixed content, so the result does not depend on the number of processes.
+Each side, then each nacelle row, is one task of fixed content: the result does not depend on the number of processes.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.errors import TrimError
+from rtsim.lpv.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.database import GRIDDED, Database, fill_invalid, quantized
 from rtsim.lpv.grid import HELICOPTER_SIDE, Grid
 from rtsim.lpv.variables import Variable
@@ -119,6 +120,7 @@ def build_database(
     *,
     jobs: int = 2,
     progress: Callable[[float], None] | None = None,
+    edge_limit: float | None = NEIGHBOUR_LIMIT,
 ) -> Database:
     """Trim and linearize on the whole grid.
 
@@ -127,9 +129,11 @@ def build_database(
         grid: Axes and wanted cells.
         jobs: Processes to use.
         progress: Called with the share of the work done since the last call; the shares add up to 1.
+        edge_limit: Largest neighbour error kept at the edge of the valid region; None keeps all.
 
     Returns:
-        The database, derivatives rounded to six digits, without pilot gains.
+        The database without pilot gains; derivatives rounded to six digits, the valid region ending where the
+        neighbour check would fail at its edge.
 
     Raises:
         TrimError: Not even the starting points of the continuation could be trimmed.
@@ -153,7 +157,7 @@ def build_database(
             arrays[name][cell] = value
         arrays["valid"][cell] = True
     fill_invalid(arrays, grid.airspeed, grid.level_layer)
-    return quantized(
+    database = quantized(
         Database(
             layer_acceleration=grid.layer_acceleration,
             airspeed=grid.airspeed,
@@ -167,6 +171,7 @@ def build_database(
             **arrays,
         )
     )
+    return database if edge_limit is None else without_poor_edges(database, edge_limit)
 
 
 def _ignore(share: float) -> None:
@@ -228,7 +233,7 @@ def _level_row(aircraft: GridAircraft, grid: Grid, number: int, before: Row) -> 
     if wanted.size == 0:
         return row
     first_row = not any(before)
-    seed = _seed(aircraft, grid, number, [v for v in wanted if first_row or before[v] is not None])
+    seed = _seed(aircraft, grid, number, [int(v) for v in wanted if first_row or before[v] is not None])
     for direction in (1, -1):
         v = seed if direction == 1 else seed - 1
         while wanted[0] <= v <= wanted[-1]:

@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -89,7 +89,7 @@ class Database:
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray):
                 kind = np.bool_ if item.name == "valid" else np.float64
-                array = np.ascontiguousarray(value, dtype=kind)
+                array: npt.NDArray[Any] = np.ascontiguousarray(value, dtype=kind)
                 if array is value and array.flags.writeable:
                     array = array.copy()
                 array.setflags(write=False)
@@ -161,8 +161,14 @@ def quantized(database: Database) -> Database:
     Returns:
         The rounded database.
     """
-    names = ("A", "B", "C", "D", "df_dnacelle")
-    return replace(database, **{name: round_mantissa(getattr(database, name), JACOBIAN_BITS) for name in names})
+    return replace(
+        database,
+        A=round_mantissa(database.A, JACOBIAN_BITS),
+        B=round_mantissa(database.B, JACOBIAN_BITS),
+        C=round_mantissa(database.C, JACOBIAN_BITS),
+        D=round_mantissa(database.D, JACOBIAN_BITS),
+        df_dnacelle=round_mantissa(database.df_dnacelle, JACOBIAN_BITS),
+    )
 
 
 def expected_shapes(database: Database) -> dict[str, tuple[int, ...]]:
@@ -258,31 +264,41 @@ def load_database(path: str | Path | None = None) -> Database:
     """Read a database; without a path, the shipped one.
 
     Args:
-        path: A NetCDF file as written by ``save_database``; the layout is described in docs/lpv.md.
+        path: A NetCDF or MATLAB file (``.mat``) as written by ``save_database``; the layout is in docs/lpv.md.
 
     Returns:
         The database, checked, its arrays read-only.
 
     Raises:
-        InputError: The file is missing, no NetCDF file, or not a database the kernels could fly.
+        InputError: The file is missing, not readable, or not a database the kernels could fly.
     """
+    if path is not None and Path(path).suffix.lower() == ".mat":
+        from rtsim.lpv.mat_file import read_mat
+
+        return read_mat(path)
     from rtsim.lpv.database_file import read_database
 
     return read_database(path)
 
 
 def save_database(database: Database, path: str | Path) -> None:
-    """Write a database to NetCDF; the target is replaced in one move when all is written.
+    """Write a database to NetCDF or, for a name ending in ``.mat``, for MATLAB.
 
-    Cells without a trim are written as missing values and filled again on reading.
+    The target is replaced in one move when all is written.
+    Cells without a trim are missing values in NetCDF and filled again on reading.
 
     Args:
         database: What to write.
-        path: The target, usually ``*.nc``.
+        path: The target, ``*.nc`` or ``*.mat``.
 
     Raises:
         OutputError: The file could not be written; the old one, if any, still stands.
     """
+    if Path(path).suffix.lower() == ".mat":
+        from rtsim.lpv.mat_file import write_mat
+
+        write_mat(database, path)
+        return
     from rtsim.lpv.database_file import write_database
 
     write_database(database, path)
@@ -309,7 +325,9 @@ def fill_invalid(arrays: Mapping[str, npt.NDArray[np.generic]], airspeed: FloatA
             good = np.flatnonzero(valid[layer, :, nacelle])
             if good.size == 0 and layer == level_layer:
                 raise InputError(
-                    "no trim at any airspeed", key=f"valid[{layer}, :, {nacelle}]", mend="leave this nacelle angle out"
+                    "no trim at any airspeed",
+                    key=f"valid[{layer}, :, {nacelle}]",
+                    mend="leave this nacelle angle out",
                 )
             for v in np.flatnonzero(~valid[layer, :, nacelle].astype(bool)):
                 source = (layer, int(good[np.argmin(np.abs(airspeed[good] - airspeed[v]))]), nacelle) if good.size else (

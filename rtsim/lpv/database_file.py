@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.errors import InputError, OutputError
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays, fill_invalid
+from rtsim.lpv.assemble import KINDS, assemble_database
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 from rtsim.lpv.variables import Variable
 
 SHIPPED: Final = Path(__file__).parent / "data" / "xv15_lpv.nc"
@@ -111,7 +112,11 @@ def _write(dataset: Any, database: Database) -> None:
         dataset.createDimension(name, values.size)
     for kind, variables in (("state", database.states), ("input", database.inputs), ("output", database.outputs)):
         dataset.createDimension(kind, len(variables))
-        for column, part in ((f"{kind}_name", "name"), (f"{kind}_unit", "unit"), (f"{kind}_description", "description")):
+        for column, part in (
+            (f"{kind}_name", "name"),
+            (f"{kind}_unit", "unit"),
+            (f"{kind}_description", "description"),
+        ):
             text = dataset.createVariable(column, str, (kind,))
             text[:] = np.array([getattr(variable, part) for variable in variables], dtype=object)
     dataset.createDimension("state_column", len(database.states))
@@ -150,24 +155,22 @@ def _put(dataset: Any, name: str, dimensions: tuple[str, ...], values: npt.NDArr
 
 
 def _read(dataset: Any, file: str) -> Database:
-    values: dict[str, Any] = {}
-    for name in (*AXES, *GRIDDED, "flap", "rotor_speed"):
-        if name not in dataset.variables:
-            raise InputError("the array is missing", file=file, key=name, mend="see docs/lpv.md for the layout")
-        array = np.asarray(dataset.variables[name][...])
-        values[name] = array.astype(np.bool_ if name == "valid" else np.float64, copy=False)
-    values["rotor_speed"] = float(values["rotor_speed"])
-    for kind in ("state", "input", "output"):
-        values[f"{kind}s"] = _read_variables(dataset, kind, file)
+    arrays = {
+        name: np.asarray(dataset.variables[name][...])
+        for name in (*AXES, *GRIDDED, "flap", "rotor_speed")
+        if name in dataset.variables
+    }
     attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
     stored = attributes.pop("content_hash", None)
     for name in ("format", "Conventions"):
         attributes.pop(name, None)
-    try:
-        _fill(values)
-        database = Database(**values, attributes=attributes, pilot=_read_pilots(dataset))
-    except InputError as error:
-        raise InputError(str(error).rstrip("."), file=file) from error
+    database = assemble_database(
+        arrays,
+        {kind: _read_variables(dataset, kind, file) for kind in KINDS},
+        attributes=attributes,
+        pilot=_read_pilots(dataset),
+        file=file,
+    )
     if stored is not None and stored != database.content_hash:
         raise InputError(
             "the numbers do not match the content hash written with them",
@@ -176,17 +179,6 @@ def _read(dataset: Any, file: str) -> Database:
             mend="restore the file, or remove the attribute if the change was meant",
         )
     return database
-
-
-def _fill(values: dict[str, Any]) -> None:
-    """Fill the cells without a trim, where shapes allow; wrong shapes are refused by ``Database`` with their names."""
-    valid, airspeed = values["valid"], values["airspeed"]
-    gridded = {name: values[name] for name in GRIDDED}
-    layers = values["layer_acceleration"]
-    if valid.shape != (layers.size, airspeed.size, values["nacelle"].size) or not valid.size:
-        return
-    if all(array.shape[:3] == valid.shape for array in gridded.values()):
-        fill_invalid(gridded, airspeed, int(np.argmin(np.abs(layers))))
 
 
 def _read_variables(dataset: Any, kind: str, file: str) -> tuple[Variable, ...]:
@@ -216,4 +208,5 @@ def _read_pilots(dataset: Any) -> dict[str, PilotArrays]:
 
 
 def _plain(value: Any) -> str | float | int:
-    return value.item() if isinstance(value, np.generic) else value
+    plain: str | float | int = value.item() if isinstance(value, np.generic) else value
+    return plain

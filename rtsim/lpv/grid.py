@@ -1,7 +1,8 @@
 """The grid of the shipped database: its axes, and which part of it is worth solving.
 
-The spacing is what the paper's own density check asks for (see ``rtsim.lpv.checks``): 5 kn below 60 kn, 7 kn to
-130 kn, 10 kn above; nacelle 2.5 deg above 60 deg, 5 deg below.
+The spacing is what the paper's own density check asks for (see ``rtsim.lpv.checks``): 5 kn below 60 kn, 3.5 kn where
+the low side of the corridor nears stall (74 to 109 kn), 7 kn to 130 kn, 10 kn above, and 2.5 kn where the flaps retract
+on the downstop; nacelle 2.5 deg above 60 deg, 5 deg below.
 """
 
 from __future__ import annotations
@@ -16,7 +17,17 @@ from rtsim.units import DEGREE, KNOT, deg, kt
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-AIRSPEED_KT = np.concatenate([np.arange(-20.0, 60.0, 5.0), np.arange(60.0, 130.0, 7.0), np.arange(130.0, 261.0, 10.0)])
+AIRSPEED_KT = np.concatenate(
+    [
+        np.arange(-20.0, 60.0, 5.0),
+        [60.0, 67.0],
+        np.arange(74.0, 109.0, 3.5),
+        [109.0, 116.0, 123.0],
+        np.arange(130.0, 170.0, 10.0),
+        np.arange(170.0, 180.0, 2.5),
+        np.arange(180.0, 261.0, 10.0),
+    ]
+)
 """Airspeed axis [kn], signed: hover by hand and tailwinds go below zero."""
 NACELLE_DEG = np.concatenate([[0.0, 0.5], np.arange(5.0, 60.0, 5.0), np.arange(60.0, 91.0, 2.5)])
 """Nacelle axis [deg]; 0.5 is the end of the downstop, where the flap schedule changes."""

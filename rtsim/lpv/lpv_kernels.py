@@ -480,7 +480,7 @@ def lpv_step(
             whole = refresh == REFRESH_EVERY_STAGE or stage == 0
             _blend(tables.cells, i, j, block if whole else states + inputs + row_sums.shape[0], work, model)
         _apply(tables, stage_x, stage_u, slope, reference, columns, deviation, row_sums)
-        weight = 1.0 if stage == 0 or stage == 3 else 2.0
+        weight = 2.0 if 0 < stage < 3 else 1.0
         ahead = dt if stage == 2 else 0.5 * dt
         for k in range(states):
             total[k] += weight * slope[k]

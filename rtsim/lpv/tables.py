@@ -117,16 +117,16 @@ def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
 def _roles(database: Database, form: int, level: int) -> npt.NDArray[np.int64]:
     roles = np.zeros(kernels.R_COUNT, dtype=np.int64)
     roles[kernels.R_FORM], roles[kernels.R_LEVEL] = form, level
-    places = (kernels.R_U, kernels.R_W, kernels.R_Q, kernels.R_PITCH, kernels.R_ALTITUDE)
-    for place, name in zip(places, RIGID_BODY_STATES, strict=True):
+    states = (kernels.R_U, kernels.R_W, kernels.R_Q, kernels.R_PITCH, kernels.R_ALTITUDE)
+    for place, name in zip(states, RIGID_BODY_STATES, strict=True):
         needed = form != kernels.FORM_PLAIN or name in SCHEDULING_STATES
         purpose = "the stitched form" if name not in SCHEDULING_STATES else "scheduling"
         if needed:
             roles[place] = required_position(database.states, name, purpose)
         else:
             roles[place] = position(database.states, name)
-    places = (kernels.R_NACELLE_RATE, kernels.R_NACELLE_ACCELERATION)
-    for place, name in zip(places, NACELLE_INPUTS, strict=True):
+    motion = (kernels.R_NACELLE_RATE, kernels.R_NACELLE_ACCELERATION)
+    for place, name in zip(motion, NACELLE_INPUTS, strict=True):
         roles[place] = position(database.inputs, name)
     roles[kernels.R_STATES] = len(database.states)
     roles[kernels.R_INPUTS] = len(database.inputs)

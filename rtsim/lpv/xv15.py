@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 
@@ -27,6 +27,10 @@ FLYABLE_STICK = 1.0
 """Stick travel: trims beyond the stops are no trims."""
 NEIGHBOUR_PITCH, NEIGHBOUR_STICK, NEIGHBOUR_COLLECTIVE = 8.0 * DEGREE, 0.35, 8.0 * DEGREE
 """Largest change from one grid point to the next on one branch [rad, -, rad]."""
+
+
+CORNER_AIRSPEED, CORNER_NACELLE = 0.1, 1e-3
+"""Reach of the finite differences around the corners of the flap schedule [m/s, rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +131,16 @@ class Xv15Grid:
             acceleration: Its level acceleration [m/s^2].
         """
         trim = TrimPoint(point.x, point.u, point.y, point.xdot, True, 0.0)
-        model = self.aircraft.linearize(_condition(airspeed, nacelle, acceleration), trim)
+        condition = _condition(airspeed, nacelle, acceleration)
+        model = self.aircraft.linearize(condition, trim)
+        # The flap schedule has corners on the downstop; a difference across one would be half a slope that is flown
+        # nowhere. There the flap is frozen, which is the derivative on the side where it does not move.
+        controls = self.aircraft.tables.controls
+        if nacelle <= controls.downstop_nacelle + CORNER_NACELLE:
+            frozen = self.aircraft.linearize(replace(condition, flap=self.flap(airspeed, nacelle)), trim)
+            if np.min(np.abs(controls.flap_retraction - airspeed)) < CORNER_AIRSPEED:
+                model = frozen
+            model = replace(model, df_dnacelle=frozen.df_dnacelle)
         return model.A, model.B, model.C, model.D, model.df_dnacelle
 
     def flap(self, airspeed: float, nacelle: float) -> float:
@@ -156,5 +169,3 @@ def source_sha256() -> str:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()
-
-

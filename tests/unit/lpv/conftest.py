@@ -75,7 +75,9 @@ class ToyAircraft:
     def solve(self, airspeed, nacelle, acceleration, guess):
         def unpack(z):
             pitch, collective, disc, elevator, stick = z
-            x = np.array([collective, pitch, airspeed * math.cos(pitch), airspeed * math.sin(pitch), 0, 0, disc, elevator])
+            x = np.array(
+                [collective, pitch, airspeed * math.cos(pitch), airspeed * math.sin(pitch), 0, 0, disc, elevator]
+            )
             return x, np.array([collective, stick, 0.0, 0.0, 0.0, 0.0, 0.0])
 
         def residual(z):
@@ -135,4 +137,4 @@ def toy_grid():
 
 @pytest.fixture(scope="session")
 def toy_database(toy_aircraft, toy_grid):
-    return build_database(toy_aircraft, toy_grid, jobs=1)
+    return build_database(toy_aircraft, toy_grid, jobs=1, edge_limit=None)

@@ -1,0 +1,97 @@
+"""Turns named arrays, as a file holds them, into a checked database."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from rtsim.errors import InputError
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays, fill_invalid
+from rtsim.lpv.variables import Variable
+
+OPTIONAL: Final = ("valid", "xdot_ref", "df_dnacelle", "flap", "rotor_speed")
+"""Arrays that a user's own database may leave out: all cells valid, unaccelerated, and the rest zero."""
+KINDS: Final = ("state", "input", "output")
+"""The three lists of variables."""
+
+
+def assemble_database(
+    arrays: Mapping[str, Any],
+    variables: Mapping[str, Sequence[Variable]],
+    *,
+    attributes: Mapping[str, str | float | int],
+    pilot: Mapping[str, PilotArrays],
+    file: str,
+) -> Database:
+    """Build a database from what a file holds; fills cells without a trim.
+
+    Args:
+        arrays: Axes and gridded arrays by name; those in ``OPTIONAL`` may be missing.
+        variables: States, inputs and outputs under ``state``, ``input`` and ``output``.
+        attributes: Attributes of the file.
+        pilot: Pilot gains by name of the design.
+        file: Name of the file, for messages.
+
+    Returns:
+        The checked database.
+
+    Raises:
+        InputError: Naming the file, the array and what is wrong with it.
+    """
+    values = dict(arrays)
+    for name in (*AXES, *GRIDDED, "flap", "rotor_speed"):
+        if name not in values and name not in OPTIONAL:
+            raise InputError("the array is missing", file=file, key=name, mend="see docs/lpv.md for the layout")
+    _complete(values)
+    values["rotor_speed"] = float(np.asarray(values["rotor_speed"]).reshape(-1)[0])
+    for name, array in values.items():
+        if name != "rotor_speed":
+            values[name] = _as_array(name, array, file)
+    try:
+        _fill(values)
+        return Database(
+            **values,
+            states=tuple(variables["state"]),
+            inputs=tuple(variables["input"]),
+            outputs=tuple(variables["output"]),
+            attributes=attributes,
+            pilot=pilot,
+        )
+    except InputError as error:
+        raise InputError(str(error).rstrip("."), file=file) from error
+
+
+def _complete(values: dict[str, Any]) -> None:
+    """Give the optional arrays their defaults where the shapes of the others allow it."""
+    x_ref = np.asarray(values["x_ref"])
+    grid = x_ref.shape[:-1]
+    values.setdefault("valid", np.ones(grid, dtype=bool))
+    values.setdefault("xdot_ref", np.zeros_like(x_ref))
+    values.setdefault("df_dnacelle", np.zeros_like(x_ref))
+    values.setdefault("flap", np.zeros(grid[1:]))
+    values.setdefault("rotor_speed", 0.0)
+
+
+def _as_array(name: str, value: Any, file: str) -> Any:
+    try:
+        if name != "valid":
+            return np.array(value, dtype=np.float64)
+        flags = np.array(value)
+        if flags.dtype != np.bool_ and not np.all(np.isin(flags, (0, 1))):
+            raise InputError("neither 0 nor 1", file=file, key=name)
+        return flags.astype(np.bool_)
+    except (TypeError, ValueError) as error:
+        raise InputError("not an array of numbers", file=file, key=name, value=str(error)) from error
+
+
+def _fill(values: dict[str, Any]) -> None:
+    """Fill the cells without a trim, where shapes allow; wrong shapes are refused by ``Database`` with their names."""
+    valid, airspeed = values["valid"], values["airspeed"]
+    gridded = {name: values[name] for name in GRIDDED}
+    layers = values["layer_acceleration"]
+    if valid.shape != (layers.size, airspeed.size, values["nacelle"].size) or not valid.size or valid.all():
+        return
+    if all(array.shape[:3] == valid.shape for array in gridded.values()):
+        fill_invalid(gridded, airspeed, int(np.argmin(np.abs(layers))))
