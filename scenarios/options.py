@@ -71,6 +71,22 @@ def chosen_scenario(name_or_path: str | None, overrides: Overrides) -> Scenario:
     return with_overrides(scenario, overrides)
 
 
+def refuse_unavailable(scenario: Scenario) -> None:
+    """Refuse what the scenario format knows and this version cannot do.
+
+    Args:
+        scenario: What is to be flown.
+    """
+    if scenario.protection not in {"off", "monitor"}:
+        raise InputError(
+            "this version watches the corridor but does not protect it yet",
+            key="--protection",
+            value=scenario.protection,
+            allowed="off, monitor",
+            mend="fly with --protection monitor",
+        )
+
+
 def with_overrides(scenario: Scenario, overrides: Overrides) -> Scenario:
     """Apply everything but the start.
 

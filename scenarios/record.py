@@ -82,8 +82,9 @@ class FlightRecord(Mapping[str, FloatArray]):
 
     @property
     def held(self) -> bool:
-        """Whether the flight was completed and all expectations held."""
-        return self.completed and all(verdict.held for verdict in self.verdicts)
+        """Whether the flight was completed, or stopped by hand, and no expectation failed."""
+        ended_well = self.completed or self.timing.ending == "stopped"
+        return ended_well and all(verdict.held for verdict in self.verdicts)
 
     def summary(self) -> dict[str, Any]:
         """Everything ``rtsim fly --json`` prints, with its keys."""

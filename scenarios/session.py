@@ -38,7 +38,6 @@ class FlightSession:
         events: Sequence[ScenarioEvent] = (),
         pilot_factory: PilotFactory | None = None,
         pilot_name: str = "mocm",
-        on_event: Callable[[LogEvent], None] | None = None,
     ) -> None:
         """Prepare a flight from the simulation's present state, which must be frame 0.
 
@@ -48,17 +47,17 @@ class FlightSession:
             events: What the scenario makes happen, in order of time.
             pilot_factory: Makes the pilot plug-in; None where the built-in pilot flies alone.
             pilot_name: How the pilot is called in messages.
-            on_event: Told about every event.
         """
         self.simulation = simulation
         self.rows = 0
         """Rows flown so far, resets or not."""
+        self.on_event: Callable[[LogEvent], None] | None = None
+        """Told about every event."""
         self._frames = frames
         self._due = [(max(0, math.ceil(event.time / simulation.dt - 1e-9)), event) for event in events]
         self._next_due = 0
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
         self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
-        self._on_event = on_event
         self._failure = ""
 
     @property
@@ -180,7 +179,7 @@ class FlightSession:
         return None
 
     def _tell(self, kind: str, text: str, data: dict[str, str] | None = None, *, level: str = "info") -> None:
-        if self._on_event is not None:
+        if self.on_event is not None:
             time = self.simulation.frame_index * self.dt
             details = {"row": self.rows, **(data or {})}
-            self._on_event(LogEvent(self.simulation.frame_index, time, kind, text, level, details))
+            self.on_event(LogEvent(self.simulation.frame_index, time, kind, text, level, details))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Protocol
 
@@ -12,6 +13,8 @@ from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
 from telemetry.log_format import LogEvent
 
 _CHUNK = 4096
+_VIEW_PIECE = 64
+_VIEW_BACKLOG = 1024
 _DROPPED = [signal.name for signal in TIMING_SIGNALS].index("telemetry_dropped")
 
 
@@ -43,11 +46,21 @@ class RowView(Protocol):
         """Show one row."""
         ...
 
-    def push_block(self, rows: FloatArray) -> None:
-        """Show many rows of a flight that is not paced; may wait for the view."""
+    @property
+    def backlog(self) -> int:
+        """Rows pushed that the view has not taken yet."""
         ...
 
-    def event(self, text: str, level: str) -> None:
+    @property
+    def alive(self) -> bool:
+        """Whether anything takes the rows."""
+        ...
+
+    def watch(self) -> None:
+        """Look after the view."""
+        ...
+
+    def event(self, text: str, level: str = "info") -> None:
         """Show an event."""
         ...
 
@@ -103,6 +116,7 @@ class FlightSinks:
         view: RowView | None = None,
         watch_corridor: bool = True,
         on_rows: Callable[[FloatArray], None] | None = None,
+        on_event: Callable[[LogEvent], None] | None = None,
     ) -> None:
         """Connect.
 
@@ -111,12 +125,14 @@ class FlightSinks:
             view: Shows what it can.
             watch_corridor: Make events of changes of the corridor level.
             on_rows: Told the last row flown (progress and status lines); must be quick.
+            on_event: Told every event; must be quick.
         """
         self.history = History()
         self.events: list[LogEvent] = []
-        self._log, self._view, self._on_rows = log, view, on_rows
+        self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
         self._watch_corridor = watch_corridor
         self._level = 0.0
+        self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
 
     def view(self, row: FloatArray, timing: FloatArray) -> None:
         """Show a row.
@@ -156,7 +172,7 @@ class FlightSinks:
         if self._log is not None:
             self._log.push_block(rows)
         if self._view is not None:
-            self._view.push_block(rows)
+            self._show_block(self._view, rows)
         if self._watch_corridor:
             levels = rows[:, COLUMN.corridor_level]
             before = np.concatenate(([self._level], levels[:-1]))
@@ -176,6 +192,17 @@ class FlightSinks:
             self._log.event(event)
         if self._view is not None:
             self._view.event(event.text, event.level)
+        if self._on_event is not None:
+            self._on_event(event)
+
+    def _show_block(self, view: RowView, rows: FloatArray) -> None:
+        """Push rows no faster than the view takes them, so that a recording at full speed has no holes."""
+        for number, row in enumerate(rows):
+            if number % _VIEW_PIECE == 0:
+                while view.backlog > _VIEW_BACKLOG and view.alive:
+                    time.sleep(0.001)
+                    view.watch()
+            view.push(row, self._no_timing)
 
     def _tell_level(self, row: FloatArray) -> None:
         level = int(row[COLUMN.corridor_level])

@@ -1,0 +1,94 @@
+"""``rtsim check``: validates scenario files and databases without flying them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rtsim.cli.output import console, emit_json, results
+from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError
+
+DATABASE_SUFFIXES = (".nc", ".mat")
+"""Files with these endings are read as LPV databases."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the app.
+
+    Args:
+        app: The ``rtsim`` command.
+    """
+    app.command("check")(check_command)
+
+
+def check_command(
+    files: Annotated[list[str], typer.Argument(help="Scenario files (.toml), library names, databases (.nc, .mat).")],
+    *,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
+) -> None:
+    """Validate scenario files and databases; every mistake is one sentence, exit 2 where there is any.
+
+    Args:
+        files: What to check.
+        json: Print one JSON object on stdout.
+    """
+    findings = {name: file_problems(name) for name in files}
+    for name, problems in findings.items():
+        for problem in problems:
+            console.print(f"rtsim: error: {problem}", markup=False, soft_wrap=True)
+        if not problems and not json:
+            results.print(f"{name}: good", markup=False)
+    if json:
+        emit_json(
+            {
+                "valid": not any(findings.values()),
+                "files": [
+                    {"file": name, "valid": not problems, "problems": problems} for name, problems in findings.items()
+                ],
+            }
+        )
+    if any(findings.values()):
+        raise typer.Exit(EXIT_BAD_INPUT)
+
+
+def file_problems(name: str) -> list[str]:
+    """All mistakes of one file, as sentences.
+
+    Args:
+        name: A path, or the name of a library scenario.
+
+    Returns:
+        No sentence where the file can be used.
+    """
+    if Path(name).suffix in DATABASE_SUFFIXES:
+        return _database_problems(Path(name))
+    from scenarios.loader import scenario_problems
+    from scenarios.problems import suggestion
+
+    suffix = Path(name).suffix
+    if suffix and suffix != ".toml" and "/" not in suffix:
+        choices = [".toml", *DATABASE_SUFFIXES]
+        mend = suggestion(suffix, choices, otherwise="name a scenario file or a database")
+        return [
+            str(InputError("is no kind of file that rtsim reads", file=name, allowed=", ".join(choices), mend=mend))
+        ]
+    return [str(problem) for problem in scenario_problems(name)]
+
+
+def _database_problems(path: Path) -> list[str]:
+    if not path.is_file():
+        return [str(InputError("does not exist", file=str(path), mend="check the path"))]
+    try:
+        if path.suffix == ".mat":
+            from rtsim.lpv.exchange import import_database
+
+            import_database(path)
+        else:
+            from rtsim.lpv.database import load_database
+
+            load_database(path)
+    except RtsimError as error:
+        return [str(error)]
+    return []

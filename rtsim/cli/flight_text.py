@@ -1,0 +1,245 @@
+"""What ``rtsim fly`` says to people on stderr: status line, progress bar, events, summary."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from rtsim.cli.output import console, progress
+
+if TYPE_CHECKING:
+    from rtsim.frame import FloatArray
+    from rtsim.realtime import FlightControl
+    from scenarios.record import FlightRecord
+    from scenarios.scenario import Scenario
+    from telemetry.log_format import LogEvent
+
+STATUS_PERIOD_S = 0.25
+"""Time between two status lines [s]."""
+COLD_START_S = 3.0
+"""A start that takes longer than this is explained [s]."""
+MAX_EVENT_LINES = 40
+"""Events told while flying; a flight along a boundary has more than anyone reads."""
+_STYLES = {"caution": "yellow", "warning": "bold yellow", "exceedance": "bold red"}
+
+
+class FlightScreen:
+    """Status and events of a running flight. The loop only leaves values here; another thread prints them."""
+
+    def __init__(self, scenario: Scenario, control: FlightControl, *, paced: bool) -> None:
+        """Prepare.
+
+        Args:
+            scenario: What is flown.
+            control: Tells whether the flight is paused, and its speed.
+            paced: Whether it is flown on the wall clock.
+        """
+        self._scenario, self._control, self._paced = scenario, control, paced
+        self._row: FloatArray | None = None
+        self._events: deque[LogEvent] = deque()
+        self._lines = 0
+        self._closing = threading.Event()
+        self._advance: Callable[[float], None] | None = None
+        self._shown_s = 0.0
+        self._status_shown = False
+
+    def on_rows(self, row: FloatArray) -> None:
+        """Take the last row flown.
+
+        Args:
+            row: The frame; it must not change later.
+        """
+        self._row = row
+        if self._advance is not None:
+            time = float(row[1])
+            self._advance(max(0.0, time - self._shown_s))
+            self._shown_s = time
+
+    def on_event(self, event: LogEvent) -> None:
+        """Take an event.
+
+        Args:
+            event: What happened.
+        """
+        self._events.append(event)
+
+    @contextmanager
+    def cold_start_notice(self) -> Iterator[Callable[[], None]]:
+        """Explain a start that takes long, which it does while kernels are compiled for the first time.
+
+        Yields:
+            To be called when the flight starts.
+        """
+        timer = threading.Timer(
+            COLD_START_S,
+            lambda: console.print(
+                "Compiling the flight's kernels; only the first flight takes this long (up to 60 s)."
+            ),
+        )
+        timer.daemon = True
+        timer.start()
+        try:
+            yield timer.cancel
+        finally:
+            timer.cancel()
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Show progress while the block runs, and everything that is left to say after it."""
+        thread = None
+        if self._paced:
+            thread = threading.Thread(target=self._keep_telling, name="status", daemon=True)
+            thread.start()
+        try:
+            if self._paced or not sys.stderr.isatty():
+                yield
+            else:
+                with progress(f"Flying {self._scenario.name}", total=self._scenario.duration) as advance:
+                    self._advance = advance
+                    yield
+        finally:
+            self._advance = None
+            self._closing.set()
+            if thread is not None:
+                thread.join(timeout=2.0)
+            self._clear_status()
+            self._tell_events()
+
+    def _keep_telling(self) -> None:
+        on_terminal = sys.stderr.isatty()
+        while not self._closing.wait(STATUS_PERIOD_S):
+            if self._events:
+                self._clear_status()
+                self._tell_events()
+            if on_terminal and self._row is not None:
+                sys.stderr.write(f"\r{status_line(self._row, self._control)}\x1b[K")
+                sys.stderr.flush()
+                self._status_shown = True
+
+    def _clear_status(self) -> None:
+        if self._status_shown:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+            self._status_shown = False
+
+    def _tell_events(self) -> None:
+        while self._events:
+            event = self._events.popleft()
+            self._lines += 1
+            if self._lines <= MAX_EVENT_LINES and event.kind != "end":
+                say(f"{event.time_s:8.2f} s  {event.text}", style=_STYLES.get(event.level))
+            elif self._lines == MAX_EVENT_LINES + 1:
+                say("            (further events are in the log)")
+
+
+def status_line(row: FloatArray, control: FlightControl) -> str:
+    """One line about a frame.
+
+    Args:
+        row: The frame, shape (SIGNAL_COUNT,).
+        control: Tells whether the flight is paused, and its speed.
+    """
+    from rtsim.frame import COLUMN
+
+    state = "paused" if control.paused else "max" if math.isinf(control.speed) else f"{control.speed:g}x"
+    return (
+        f"{row[COLUMN.time_s]:7.1f} s {state:>6} | {row[COLUMN.airspeed_kt]:6.1f} kn | "
+        f"nacelle {row[COLUMN.nacelle_deg]:5.1f} deg | {row[COLUMN.altitude_m]:6.1f} m | "
+        f"pitch {row[COLUMN.pitch_deg]:5.1f} deg | flapping {row[COLUMN.flapping_deg]:4.1f} deg | "
+        f"margin {row[COLUMN.margin_kt]:5.1f} kn"
+    )
+
+
+def say(sentence: str, *, style: str | None = None) -> None:
+    """Print one sentence on stderr as it is: no markup, no line breaks of our own.
+
+    Args:
+        sentence: What to say.
+        style: Colour and weight on a terminal.
+    """
+    console.print(sentence, style=style, markup=False, highlight=False, soft_wrap=True)
+
+
+def describe(scenario: Scenario, *, speed: float, outputs: list[str]) -> None:
+    """Say what is about to be flown.
+
+    Args:
+        scenario: What is flown.
+        speed: Multiple of real time; infinity is as fast as possible.
+        outputs: Where the flight goes, in words.
+    """
+    pace = (
+        "as fast as possible" if math.isinf(speed) else "in real time" if speed == 1.0 else f"at {speed:g} x real time"
+    )
+    say(f"{scenario.title}: {scenario.duration:.1f} s {pace}", style="bold")
+    say(
+        f"plant {scenario.plant}, pilot {scenario.pilot}, outer loop {scenario.outer_loop}, "
+        f"corridor {scenario.corridor_name}, protection {scenario.protection}, {scenario.rate_hz} Hz, "
+        f"seed {scenario.seed}",
+    )
+    for line in outputs:
+        say(line)
+
+
+def summarize(record: FlightRecord) -> None:
+    """Tell how a flight went.
+
+    Args:
+        record: The flight.
+    """
+    timing, metrics = record.timing, record.metrics
+    ending = "Completed" if record.completed else "Ended early"
+    say(
+        f"{ending}: {record.end_reason}; {timing.frames} frames, {timing.duration_s:.1f} s in {timing.wall_s:.2f} s "
+        f"({timing.real_time_factor:.1f} x real time)",
+    )
+    if metrics is not None:
+        _print_metrics(record.summary())
+    if timing.lateness_us is not None and timing.work_us is not None and timing.work_cpu_us is not None:
+        late, work, cpu = timing.lateness_us, timing.work_us, timing.work_cpu_us
+        say(
+            f"Loop: lateness p50 {late.p50:.1f} us, p99 {late.p99:.0f} us, max {late.max:.0f} us; "
+            f"work p99 {work.p99:.0f} us wall, {cpu.p99:.0f} us CPU; overruns {timing.overruns}; "
+            f"drift {timing.drift_frames:.2f} frames",
+        )
+    for verdict in record.verdicts:
+        mark, style = ("held  ", None) if verdict.held else ("FAILED", "bold red")
+        say(f"  {mark} {verdict.name}{_measured(verdict.value, verdict.limit)}", style=style)
+    say(f"History {record.history_sha256}")
+
+
+def _print_metrics(summary: dict[str, Any]) -> None:
+    speed, nacelle, height = summary["airspeed_kt"], summary["nacelle_deg"], summary["altitude_m"]
+    flapping, pitch, corridor = summary["flapping_deg"], summary["pitch_deg"], summary["corridor"]
+    stick, lever = summary["stick"], summary["lever"]
+    late = flapping["peak_after_30_s"]
+    tracking = f"error {speed['rms_error']:.3f} kn rms, {speed['max_error']:.2f} kn at most"
+    tilting = f"error {nacelle['max_error']:.3f} deg at most, rate {nacelle['max_rate_deg_s']:.2f} deg/s at most"
+    flapped = f"rms {flapping['rms']:.2f} deg" + ("" if late is None else f", {late:.2f} deg at most after 30 s")
+    on_stop = f"{summary['controls_on_stop_frames']} frames with a control on its stop"
+    outside = f"{corridor['exceedances']} exceedances, {corridor['time_outside_s']:.1f} s outside"
+    rows = (
+        ("Airspeed", f"final {speed['final']:.2f} kn", tracking),
+        ("Nacelle", f"final {nacelle['final']:.2f} deg", tilting),
+        ("Altitude", f"final {height['final']:.2f} m", f"deviation {height['max_deviation']:.2f} m at most"),
+        ("Flapping", f"peak {flapping['peak']:.2f} deg at {flapping['peak_time_s']:.1f} s", flapped),
+        ("Pitch", f"{pitch['min']:.1f} to {pitch['max']:.1f} deg", ""),
+        ("Stick", f"travel {stick['travel_in']:.2f} in", f"rate {stick['rms_rate_in_s']:.2f} in/s rms"),
+        ("Lever", f"travel {lever['travel']:.3f}", f"rate {lever['rms_rate_per_s']:.3f} 1/s rms; {on_stop}"),
+        ("Corridor", f"worst margin {corridor['worst_margin_kt']:.1f} kn", outside),
+    )
+    for name, result, details in rows:
+        say(f"{name:9} {result:25} {details}".rstrip())
+
+
+def _measured(value: float | bool | None, limit: float | bool | list[float]) -> str:
+    if isinstance(value, bool) or isinstance(limit, bool):
+        return ""
+    shown = "no value" if value is None else f"{value:.4g}"
+    allowed = f"{limit[0]:g} to {limit[1]:g}" if isinstance(limit, list) else f"limit {limit:g}"
+    return f": {shown} ({allowed})"

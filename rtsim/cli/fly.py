@@ -1,0 +1,299 @@
+"""``rtsim fly``: flies a scenario, live or as fast as the machine allows, and says how it went."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from rtsim.cli.flight_text import FlightScreen, describe, say, summarize
+from rtsim.cli.output import emit_json
+from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
+
+if TYPE_CHECKING:
+    from rtsim.realtime import FlightControl
+    from scenarios.record import FlightRecord
+    from scenarios.scenario import Scenario
+    from telemetry.view_options import ViewOptions
+
+EXIT_BY_SIGNAL = {signal.SIGINT: 130, signal.SIGTERM: 143}
+"""Exit codes after a clean end that a signal asked for."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the app.
+
+    Args:
+        app: The ``rtsim`` command.
+    """
+    app.command("fly")(fly_command)
+
+
+def fly_command(
+    scenario: Annotated[
+        str | None,
+        typer.Argument(help="Name of a scenario, or path of a .toml file.", show_default="typical_conversion"),
+    ] = None,
+    *,
+    pilot: Annotated[str | None, typer.Option(help="mocm, an installed pilot, or MODULE:CLASS.")] = None,
+    plant: Annotated[Literal["lpv", "lpv-plain", "nonlinear"] | None, typer.Option(help="Model to fly.")] = None,
+    outer_loop: Annotated[
+        Literal["integrators", "pi"] | None, typer.Option(help="How the MOCM holds airspeed and altitude.")
+    ] = None,
+    protection: Annotated[
+        Literal["off", "monitor", "governor", "full"] | None, typer.Option(help="What to do about the corridor.")
+    ] = None,
+    corridor: Annotated[Literal["design", "flight"] | None, typer.Option(help="Boundaries to watch.")] = None,
+    speed: Annotated[str, typer.Option(help="Multiple of real time, or max.")] = "1",
+    rate: Annotated[int | None, typer.Option(help="Frames per second [Hz].", show_default="250")] = None,
+    seed: Annotated[int | None, typer.Option(help="Root of every random stream.", show_default="0")] = None,
+    duration: Annotated[float | None, typer.Option(help="Length of the flight [s].")] = None,
+    start: Annotated[Literal["hover", "conversion", "cruise"] | None, typer.Option(help="Where to start.")] = None,
+    airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed at the start [kn].")] = None,
+    nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle at the start [deg], 90 helicopter.")] = None,
+    altitude_m: Annotated[float | None, typer.Option(help="Altitude at the start [m].")] = None,
+    wind_kt: Annotated[float | None, typer.Option(help="Steady tailwind [kn].")] = None,
+    pilot_noise: Annotated[bool | None, typer.Option(help="Let the MOCM's noise act.")] = None,
+    headless: Annotated[bool, typer.Option("--headless", help="Open no viewer.")] = False,
+    record: Annotated[Path | None, typer.Option(help="Write the Rerun view into FILE.rrd.")] = None,
+    layout: Annotated[Literal["pilot", "engineer"], typer.Option(help="Layout of the viewer.")] = "pilot",
+    log: Annotated[Path | None, typer.Option(help="Write the flight log PATH.parquet (a directory).")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier log at that path.")] = False,
+    mavlink: Annotated[list[str] | None, typer.Option(help="Send MAVLink to HOST:PORT (not in this version).")] = None,
+    overrun_policy: Annotated[str, typer.Option(help="catch-up, or stop:N to end at the Nth overrun.")] = "catch-up",
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
+) -> None:
+    """Fly a scenario: the XV-15, the MOCM pilot, the conversion corridor, in real time unless --speed says otherwise.
+
+    While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, q quits.
+
+    Args:
+        scenario: Name or path.
+        pilot: Who flies.
+        plant: Model to fly.
+        outer_loop: How the MOCM holds airspeed and altitude.
+        protection: What to do about the corridor.
+        corridor: Boundaries to watch.
+        speed: Multiple of real time, or max.
+        rate: Frames per second [Hz].
+        seed: Root of every random stream.
+        duration: Length of the flight [s].
+        start: Named start.
+        airspeed_kt: Airspeed at the start [kn].
+        nacelle_deg: Nacelle angle at the start [deg].
+        altitude_m: Altitude at the start [m].
+        wind_kt: Steady tailwind [kn].
+        pilot_noise: Whether the MOCM's noise acts.
+        headless: Open no viewer.
+        record: Rerun recording to write.
+        layout: Layout of the viewer.
+        log: Flight log to write.
+        overwrite: Replace an earlier log.
+        mavlink: Where to send MAVLink.
+        overrun_policy: What to do about overruns.
+        json: Print one JSON object on stdout.
+
+    Raises:
+        InputError: Something that was asked for does not exist or is out of range.
+        OutputError: A log or recording failed.
+        OverrunStop: The overrun policy ended the flight.
+    """
+    from rtsim.realtime.policy import OverrunPolicy
+    from rtsim.units import deg, kt
+    from scenarios.options import Overrides, chosen_scenario, refuse_unavailable
+    from scenarios.pilots import load_pilot
+
+    if mavlink:
+        raise InputError(
+            "sending MAVLink is not in this version yet", key="--mavlink", value=mavlink[0], mend="leave it out"
+        )
+    OverrunPolicy.parse(overrun_policy)
+    overrides = Overrides(
+        plant=plant,
+        outer_loop=outer_loop,
+        pilot=pilot,
+        protection=protection,
+        corridor=corridor,
+        rate_hz=rate,
+        seed=seed,
+        wind=None if wind_kt is None else kt(wind_kt),
+        pilot_noise=pilot_noise,
+        duration=duration,
+        start=start,
+        airspeed=None if airspeed_kt is None else kt(airspeed_kt),
+        nacelle_angle=None if nacelle_deg is None else deg(nacelle_deg),
+        altitude=altitude_m,
+    )
+    pace = parse_speed(speed)
+    chosen = chosen_scenario(scenario, overrides)
+    refuse_unavailable(chosen)
+    load_pilot(chosen.pilot)
+    view = _view_options(headless=headless, record=record, layout=layout)
+    flight, code = _fly(
+        chosen,
+        speed=pace,
+        view=view,
+        outputs={"log": log, "overwrite": overwrite},
+        policy=overrun_policy,
+    )
+    if json:
+        places = {"log": log, "record": record}
+        emit_json({**flight.summary(), **{key: str(path) for key, path in places.items() if path is not None}})
+    if code:
+        if flight.failure is not None:
+            say(f"Also: {flight.failure}")
+        raise typer.Exit(code)
+    if flight.timing.ending == "overruns":
+        raise OverrunStop(f"{flight.end_reason}; fly slower, at a lower rate, or with --overrun-policy catch-up.")
+    if flight.failure is not None:
+        raise flight.failure
+    if not flight.held:
+        raise typer.Exit(EXIT_EXPECTATION_FAILED)
+
+
+def parse_speed(text: str) -> float:
+    """Read ``--speed``.
+
+    Args:
+        text: ``max`` or a number.
+
+    Returns:
+        Multiple of real time; infinity for ``max``.
+
+    Raises:
+        InputError: If it is neither.
+    """
+    from rtsim.realtime.control import SPEED_RANGE, checked_speed
+
+    if text == "max":
+        return math.inf
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = math.nan
+    if math.isinf(speed) or math.isnan(speed):
+        low, high = SPEED_RANGE
+        raise InputError(
+            "is not a speed",
+            key="--speed",
+            value=text,
+            allowed=f"{low:g} to {high:g} times real time, or max",
+            mend="write for example --speed 2",
+        )
+    return checked_speed(speed)
+
+
+def _view_options(*, headless: bool, record: Path | None, layout: Literal["pilot", "engineer"]) -> ViewOptions | None:
+    """What to show; None for nothing. Without a display the viewer is left out, which is said."""
+    from telemetry.view_options import ViewOptions, display_available
+
+    if record is not None and record.suffix != ".rrd":
+        raise InputError("must end in .rrd", key="--record", value=str(record), mend="name it FILE.rrd")
+    viewer = not headless
+    if viewer and not display_available():
+        viewer = False
+        say("No display here: flying headless, without a viewer (--record FILE.rrd keeps the view).")
+    if not viewer and record is None:
+        return None
+    return ViewOptions(viewer=viewer, record=record, layout=layout)
+
+
+def _fly(
+    scenario: Scenario,
+    *,
+    speed: float,
+    view: ViewOptions | None,
+    outputs: dict[str, Any],
+    policy: str,
+) -> tuple[FlightRecord, int]:
+    """Fly and summarize; gives the record, and the exit code where a signal ended the flight (else 0)."""
+    from rtsim.realtime.control import FlightControl
+    from rtsim.realtime.keys import KEY_HELP, KeyReader
+
+    control = FlightControl()
+    places = [
+        f"{what}: {place}"
+        for what, place in (("log", outputs["log"]), ("recording", view.record if view else None))
+        if place is not None
+    ]
+    describe(scenario, speed=speed, outputs=places)
+    screen = FlightScreen(scenario, control, paced=not math.isinf(speed))
+    from scenarios.runner import FlightOutputs, fly
+
+    with screen.cold_start_notice() as started, _stopping_signals(control) as signals, KeyReader(control) as keys:
+        if keys.active and not math.isinf(speed):
+            say(f"Keys: {KEY_HELP}")
+
+        def on_start() -> None:
+            started()
+            signals.arm()
+
+        wanted = FlightOutputs(
+            **outputs,
+            view=view,
+            on_message=say,
+            on_rows=screen.on_rows,
+            on_event=screen.on_event,
+            on_start=on_start,
+        )
+        with screen.running():
+            flight = fly(
+                scenario,
+                speed="max" if math.isinf(speed) else speed,
+                control=control,
+                overrun_policy=policy,
+                outputs=wanted,
+            )
+    summarize(flight)
+    return flight, EXIT_BY_SIGNAL.get(signals.received, 0) if signals.received else 0
+
+
+class StoppingSignals:
+    """SIGINT and SIGTERM end a running flight cleanly; a second one ends the program at once."""
+
+    def __init__(self, control: FlightControl) -> None:
+        """Prepare; nothing is caught before :meth:`arm`.
+
+        Args:
+            control: The flight to stop.
+        """
+        self.received: signal.Signals | None = None
+        """The signal that ended the flight."""
+        self._control = control
+        self._previous: dict[signal.Signals, Any] = {}
+
+    def arm(self) -> None:
+        """Catch the signals from now on; before, they end the program as usual."""
+        for number in EXIT_BY_SIGNAL:
+            self._previous[number] = signal.signal(number, self._handle)
+
+    def disarm(self) -> None:
+        """Give the signals back."""
+        while self._previous:
+            number, handler = self._previous.popitem()
+            signal.signal(number, handler)
+
+    def _handle(self, number: int, _frame: FrameType | None) -> None:
+        if self.received is not None:
+            self.disarm()
+            os.kill(os.getpid(), number)
+            return
+        self.received = signal.Signals(number)
+        name = "Ctrl-C" if number == signal.SIGINT else self.received.name
+        self._control.stop(f"stopped by {name}")
+
+
+@contextmanager
+def _stopping_signals(control: FlightControl) -> Iterator[StoppingSignals]:
+    signals = StoppingSignals(control)
+    try:
+        yield signals
+    finally:
+        signals.disarm()

@@ -1,0 +1,304 @@
+"""Flies scenarios: composes simulation, pilot, log and view, lets the executive pace them, and measures the result."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import platform
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import rtsim
+from rtsim.corridor import load_corridor
+from rtsim.errors import InputError, OutputError
+from rtsim.frame import FloatArray, history_sha256
+from rtsim.realtime import Executive, FlightControl, OverrunPolicy
+from rtsim.realtime.report import TimingReport
+from rtsim.simulation import FlightSetup, Simulation
+from rtsim.units import to_deg, to_kt
+from scenarios.loader import load_scenario
+from scenarios.metrics import flight_metrics
+from scenarios.options import Overrides, refuse_unavailable, with_overrides
+from scenarios.pilots import load_pilot
+from scenarios.record import FlightRecord, judge
+from scenarios.scenario import Scenario
+from scenarios.session import FlightSession
+from scenarios.sinks import FlightSinks
+from telemetry.corridor_outline import CorridorOutline
+from telemetry.log_format import FlightMetadata, LogEvent
+
+if TYPE_CHECKING:
+    from telemetry.recorder import Recorder
+    from telemetry.rerun_view import RerunView
+    from telemetry.view_options import ViewOptions
+
+VIEW_PATIENCE_S = 1.5
+"""How long the first frame waits for a view that is starting [s]; the flight begins without it after that."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOutputs:
+    """What a flight leaves behind or shows besides its record."""
+
+    log: Path | None = None
+    """Flight log to write, a directory (``PATH.parquet``)."""
+    overwrite: bool = False
+    """Replace an earlier log at that path."""
+    view: ViewOptions | None = None
+    """Rerun view and recording; None shows nothing."""
+    on_message: Callable[[str], None] | None = None
+    """Told what the view has to say, one sentence at a time."""
+    on_rows: Callable[[FloatArray], None] | None = None
+    """Told the last row flown; must be quick."""
+    on_event: Callable[[LogEvent], None] | None = None
+    """Told every event; must be quick."""
+    on_start: Callable[[], None] | None = None
+    """Called when everything is warm, just before the first frame."""
+
+
+def fly(
+    scenario: str | Path | Scenario = "typical_conversion",
+    *,
+    speed: float | Literal["max"] = 1.0,
+    overrides: Overrides | None = None,
+    control: FlightControl | None = None,
+    overrun_policy: str = "catch-up",
+    outputs: FlightOutputs | None = None,
+) -> FlightRecord:
+    """Fly a scenario to its end.
+
+    Args:
+        scenario: A library name, a path, or a scenario already loaded.
+        speed: Multiple of real time, or ``max``.
+        overrides: What to change of the scenario.
+        control: The hand on the flight (pause, step, warp, reset, pilot, stop), usable from another thread.
+        overrun_policy: ``catch-up`` or ``stop:N``.
+        outputs: Log, view and callbacks.
+
+    Returns:
+        The flight; ``failure`` tells whether a log or recording broke on the way.
+
+    Raises:
+        InputError: If something that was asked for does not exist or cannot be flown.
+        OutputError: If a log or recording cannot be started.
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    if overrides is not None:
+        if overrides.moves_start or overrides.altitude is not None:
+            raise InputError("moves the start", key="overrides", mend="use scenarios.options.chosen_scenario")
+        scenario = with_overrides(scenario, overrides)
+    refuse_unavailable(scenario)
+    policy = OverrunPolicy.parse(overrun_policy)
+    outputs = outputs if outputs is not None else FlightOutputs()
+    # Whatever can be refused is refused before a log is begun or a viewer opened.
+    simulation = Simulation(flight_setup(scenario))
+    session = FlightSession(
+        simulation,
+        frames=flight_frames(scenario),
+        events=scenario.events,
+        pilot_factory=load_pilot(scenario.pilot),
+        pilot_name=scenario.pilot,
+    )
+    live = speed != "max"
+    log: Recorder | None = None
+    view: RerunView | None = None
+    try:
+        log = _start_log(scenario, simulation, outputs, live=live)
+        view = _start_view(scenario, outputs)
+        sinks = FlightSinks(
+            log=log,
+            view=view,
+            watch_corridor=scenario.protection != "off",
+            on_rows=outputs.on_rows,
+            on_event=outputs.on_event,
+        )
+        session.on_event = sinks.event
+        simulation.warm_up()
+        if view is not None and live:
+            view.wait_ready(VIEW_PATIENCE_S)
+        executive = Executive(
+            session, sinks, control=control, speed=math.inf if speed == "max" else speed, policy=policy
+        )
+        if outputs.on_start is not None:
+            outputs.on_start()
+        timing = executive.fly()
+        record = _measure(scenario, session, sinks, timing, simulation.database_hash)
+    except BaseException:
+        _close(log, view, None)
+        raise
+    return dataclasses.replace(record, failure=_close(log, view, record))
+
+
+def flight_frames(scenario: Scenario) -> int:
+    """Frames of a flight: the last one starts before its end.
+
+    Args:
+        scenario: What is flown.
+    """
+    return max(1, math.ceil(scenario.duration * scenario.rate_hz - 1e-6))
+
+
+def flight_setup(scenario: Scenario) -> FlightSetup:
+    """What the simulation needs to know of a scenario.
+
+    Args:
+        scenario: What is flown.
+    """
+    return FlightSetup(
+        programme=scenario.programme,
+        plant=scenario.plant,
+        outer_loop=scenario.outer_loop,
+        pilot="mocm" if load_pilot(scenario.pilot) is None else "external",
+        corridor=scenario.corridor_name,
+        rate_hz=scenario.rate_hz,
+        start_airspeed=scenario.start.airspeed,
+        start_nacelle=scenario.start.nacelle_angle,
+        start_altitude=scenario.start.altitude,
+        wind=scenario.wind,
+        seed=scenario.seed,
+        pilot_noise=scenario.pilot_noise,
+    )
+
+
+def corridor_outline(name: str) -> CorridorOutline:
+    """The boundaries of a corridor as plain arrays, for views and logs.
+
+    Args:
+        name: ``design`` or ``flight``.
+    """
+    corridor = load_corridor(name)
+    high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
+    high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
+    high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]
+    low = [(to_deg(float(n)), to_kt(float(v))) for n, v in zip(corridor.low.nacelle, corridor.low.speed, strict=True)]
+    corners = sorted({*high_nacelle, *(float(n) for n in corridor.low.nacelle)})
+    centre = [(to_deg(angle), to_kt(float(corridor.centre_speed(angle)))) for angle in corners]
+    lines = [tuple(zip(*line, strict=True)) for line in (low, high, centre)]
+    return CorridorOutline.from_lines(name, low=lines[0], high=lines[1], centre=lines[2])
+
+
+def replay_setup(scenario: Scenario) -> dict[str, Any]:
+    """Everything a replay must know besides commands and events, as JSON values that read back exactly.
+
+    Args:
+        scenario: What is flown.
+    """
+    setup = flight_setup(scenario)
+    values = {field.name: getattr(setup, field.name) for field in dataclasses.fields(setup)}
+    values["programme"] = setup.programme.to_dict()
+    return {"flight": values, "pilot_name": scenario.pilot, "protection": scenario.protection}
+
+
+def setup_from_json(values: dict[str, Any]) -> FlightSetup:
+    """Read back what :func:`replay_setup` wrote.
+
+    Args:
+        values: Its ``flight`` entry.
+    """
+    from rtsim.programme import Programme
+
+    return FlightSetup(**{**values, "programme": Programme.from_dict(values["programme"])})
+
+
+def versions() -> dict[str, str]:
+    """Versions and machine type that a history hash is promised for."""
+    import numba
+    import numpy as np
+
+    return {
+        "rtsim": rtsim.__version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "machine": f"{platform.system()} {platform.machine()}",
+        "byteorder": sys.byteorder,
+    }
+
+
+def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
+    if outputs.view is None:
+        return None
+    from telemetry.rerun_view import RerunView
+
+    return RerunView(
+        outputs.view,
+        corridor=corridor_outline(scenario.corridor_name),
+        title=scenario.name,
+        rate_hz=scenario.rate_hz,
+        on_message=outputs.on_message,
+    )
+
+
+def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutputs, *, live: bool) -> Recorder | None:
+    if outputs.log is None:
+        return None
+    from telemetry.recorder import Recorder
+
+    metadata = FlightMetadata(
+        scenario_name=scenario.name,
+        scenario_toml=scenario.source,
+        database_hash=simulation.database_hash,
+        seed=scenario.seed,
+        rate_hz=float(scenario.rate_hz),
+        versions=versions(),
+        setup=replay_setup(scenario),
+        corridor=corridor_outline(scenario.corridor_name),
+    )
+    return Recorder(outputs.log, metadata, live=live, overwrite=outputs.overwrite)
+
+
+def _measure(
+    scenario: Scenario, session: FlightSession, sinks: FlightSinks, timing: TimingReport, database_hash: str
+) -> FlightRecord:
+    rows = sinks.history.rows()
+    metrics = flight_metrics(rows, scenario.programme, session.dt) if len(rows) else None
+    completed = session.completed and timing.ending == "finished"
+    last = int(rows[-1, 0]) + 1 if len(rows) else 0
+    sinks.event(LogEvent(last, last * session.dt, "end", timing.end_reason, "info" if completed else "warning"))
+    return FlightRecord(
+        scenario=scenario,
+        rows=rows,
+        metrics=metrics,
+        timing=timing,
+        events=tuple(sinks.events),
+        completed=completed,
+        end_reason=timing.end_reason,
+        history_sha256=history_sha256([rows]),
+        # A flight that was stopped by hand has not failed what it was never flown to.
+        verdicts=()
+        if timing.ending == "stopped"
+        else judge(scenario, metrics, completed=completed, end_reason=timing.end_reason),
+        database_hash=database_hash,
+    )
+
+
+def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | None) -> OutputError | None:
+    """Close log and view whatever happened; the first that failed is reported."""
+    failure: OutputError | None = None
+    if log is not None:
+        try:
+            log.close(_log_summary(record) if record is not None else None)
+        except OutputError as error:
+            failure = error
+    if view is not None:
+        view.close()
+        failure = failure or view.failure
+    return failure
+
+
+def _log_summary(record: FlightRecord) -> dict[str, Any]:
+    """The end of a log: the record's summary with its wall clock."""
+    return {**_without_nan(record.summary()), "ended_unix_s": time.time()}
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
