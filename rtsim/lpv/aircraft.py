@@ -165,9 +165,7 @@ class LpvAircraft:
         """
         import control
 
-        self._require_inside(airspeed, nacelle)
-        level = self.database.level_layer
-        A, B, C, D = (self._interpolate(getattr(self.database, name)[level], airspeed, nacelle) for name in "ABCD")
+        A, B, C, D = self.matrices(airspeed=airspeed, nacelle=nacelle)
         return control.StateSpace(
             A, B, C, D,
             states=[variable.name for variable in self.database.states],
@@ -175,6 +173,33 @@ class LpvAircraft:
             outputs=[variable.name for variable in self.database.outputs],
             name=f"{to_kt(airspeed):.0f} kn, nacelle {to_deg(nacelle):.1f} deg",
         )  # fmt: skip
+
+    def matrices(self, *, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Matrices of the linear model of level flight, interpolated between the grid points.
+
+        Args:
+            airspeed: Horizontal airspeed, signed [m/s].
+            nacelle: Nacelle angle [rad].
+
+        Returns:
+            A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu).
+
+        Raises:
+            InputError: Airspeed or nacelle angle outside the grid.
+        """
+        self._require_inside(airspeed, nacelle)
+        d, level = self.database, self.database.level_layer
+        A, B, C, D = (self._interpolate(array[level], airspeed, nacelle) for array in (d.A, d.B, d.C, d.D))
+        return A, B, C, D
+
+    def flap(self, *, airspeed: float, nacelle: float) -> float:
+        """Flap deflection of the schedule, interpolated between the grid points [rad].
+
+        Args:
+            airspeed: Horizontal airspeed, signed [m/s].
+            nacelle: Nacelle angle [rad].
+        """
+        return float(self._interpolate(self.database.flap, airspeed, nacelle))
 
     def is_valid(self, *, airspeed: float, nacelle: float) -> bool:
         """Whether all grid points around a condition have a level trim.

@@ -330,8 +330,9 @@ def fill_invalid(arrays: Mapping[str, npt.NDArray[np.generic]], airspeed: FloatA
                     mend="leave this nacelle angle out",
                 )
             for v in np.flatnonzero(~valid[layer, :, nacelle].astype(bool)):
-                source = (layer, int(good[np.argmin(np.abs(airspeed[good] - airspeed[v]))]), nacelle) if good.size else (
-                    level_layer, v, nacelle)  # fmt: skip
+                source = (level_layer, int(v), nacelle)
+                if good.size:
+                    source = (layer, int(good[np.argmin(np.abs(airspeed[good] - airspeed[v]))]), nacelle)
                 for name, array in arrays.items():
                     if name != "valid":
                         array[layer, v, nacelle] = array[source]
