@@ -1,0 +1,254 @@
+"""What the air does in a flight: turbulence and discrete gusts as data, and the state that the kernels advance."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rtsim.atmosphere import dryden_kernels as dryden
+from rtsim.atmosphere import gust_kernels as kernels
+from rtsim.atmosphere.gust_kernels import GustTables
+from rtsim.errors import InputError
+from rtsim.frame import FloatArray
+from rtsim.units import FOOT, KNOT
+
+Severity = Literal["none", "light", "moderate", "severe"]
+GustShape = Literal["one-minus-cosine", "build-up", "ramp"]
+GustAxes = Literal["earth", "body"]
+
+SEVERITY_WIND: dict[Severity, float] = {
+    "none": 0.0,
+    "light": 15.0 * KNOT,
+    "moderate": 30.0 * KNOT,
+    "severe": 45.0 * KNOT,
+}
+"""Wind at 20 ft by severity [m/s] (MIL-F-8785C figure 9)."""
+GUST_SHAPES: dict[GustShape, int] = {
+    "one-minus-cosine": kernels.SHAPE_ONE_MINUS_COSINE,
+    "build-up": kernels.SHAPE_BUILD_UP,
+    "ramp": kernels.SHAPE_RAMP,
+}
+"""Shapes of discrete gusts: there and back (14 CFR 25.341), half a cosine (MIL-F-8785C) or straight, and staying."""
+LARGEST_WIND = 60.0 * KNOT
+"""Largest wind at 20 ft [m/s]."""
+LARGEST_GUST = 60.0 * KNOT
+"""Largest amplitude of a discrete gust [m/s]."""
+LIVE_SLOTS = 8
+"""Room for gusts that are added during a flight."""
+
+WING_SPAN = 32.17 * FOOT
+"""Wing span of the XV-15 [m] (NASA CR-166536)."""
+MINIMUM_SPEED = 30.0 * KNOT
+"""Slowest passage through the frozen field [m/s]: in hover it is the wind that carries the turbulence past. The MOCM's
+design gusts use the same bound."""
+
+# MIL-F-8785C figure 7: intensity [ft/s] against height [ft] for probabilities of exceedance of 1e-2, 1e-3 and 1e-5,
+# which the specification calls light, moderate and severe; read from the figure by the authors of JSBSim (FGWinds).
+_CURVE_HEIGHT_FT = (500.0, 1750.0, 3750.0, 7500.0, 15000.0, 25000.0, 35000.0, 45000.0)
+_CURVES_FT_S: tuple[tuple[Severity, tuple[float, ...]], ...] = (
+    ("none", (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)),
+    ("light", (6.6, 6.9, 7.4, 6.7, 4.6, 2.7, 0.4, 0.0)),
+    ("moderate", (8.6, 9.6, 10.6, 10.1, 8.0, 6.6, 5.0, 4.2)),
+    ("severe", (15.6, 17.6, 23.0, 23.6, 22.1, 20.0, 16.0, 15.1)),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Turbulence:
+    """Dryden turbulence, MIL-F-8785C. SI."""
+
+    wind_at_20_ft: float
+    """Wind at 20 ft, which sets the severity [m/s]; 0 is none. ``SEVERITY_WIND`` holds the named ones."""
+    fade_in: float = 2.0
+    """Time over which it builds up from nothing [s]: a flight starts trimmed, in calm air."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is out of range (:class:`InputError`)."""
+        _within("wind_at_20_ft", self.wind_at_20_ft, 0.0, LARGEST_WIND, "m/s")
+        _within("fade_in", self.fade_in, 0.0, 60.0, "s")
+
+    @classmethod
+    def of_severity(cls, severity: Severity, *, fade_in: float = 2.0) -> Turbulence:
+        """Give the turbulence of a named severity.
+
+        Args:
+            severity: ``none``, ``light``, ``moderate`` or ``severe``: 0, 15, 30, 45 kn of wind at 20 ft.
+            fade_in: Time over which it builds up [s].
+
+        Raises:
+            InputError: There is no such severity.
+        """
+        if severity not in SEVERITY_WIND:
+            raise InputError(
+                "is not a severity", key="severity", value=severity, allowed=", ".join(SEVERITY_WIND), mend="choose one"
+            )
+        return cls(wind_at_20_ft=SEVERITY_WIND[severity], fade_in=fade_in)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gust:
+    """One discrete gust, the same over the whole aircraft. SI."""
+
+    start: float
+    """When it is met [s]."""
+    ahead: float = 0.0
+    """Amplitude from ahead, a headwind positive; with ``axes="body"`` along body x [m/s]."""
+    below: float = 0.0
+    """Amplitude from below, an updraft positive; with ``axes="body"`` along body z [m/s]."""
+    shape: GustShape = "one-minus-cosine"
+    """``one-minus-cosine`` rises and falls, ``build-up`` (half a cosine) and ``ramp`` (straight) rise and stay."""
+    duration: float | None = None
+    """Time from beginning to end of the pulse or of the rise [s]; 0 with ``ramp``: a sharp edge."""
+    length: float | None = None
+    """The same as a distance flown [m]; one of the two is given."""
+    axes: GustAxes = "earth"
+    """``earth``: horizontal and vertical, turned into body axes by the pitch attitude; ``body``: as given."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is out of range or contradicts itself (:class:`InputError`)."""
+        _within("start", self.start, 0.0, 36_000.0, "s")
+        for name, amplitude in (("ahead", self.ahead), ("below", self.below)):
+            _within(name, amplitude, -LARGEST_GUST, LARGEST_GUST, "m/s")
+        for name, value, allowed in (
+            ("shape", self.shape, tuple(GUST_SHAPES)),
+            ("axes", self.axes, ("earth", "body")),
+        ):
+            if value not in allowed:
+                raise InputError("is not known", key=name, value=value, allowed=", ".join(allowed), mend="choose one")
+        if (self.duration is None) == (self.length is None):
+            raise InputError(
+                "needs either a duration or a length", key="gust", mend="give duration in seconds or length in metres"
+            )
+        smallest = 0.0 if self.shape == "ramp" else 0.01
+        if self.duration is not None:
+            _within("duration", self.duration, smallest, 3600.0, "s")
+        if self.length is not None:
+            _within("length", self.length, smallest, 100_000.0, "m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AirSpecification:
+    """All that the air does in a flight; the default is calm."""
+
+    turbulence: Turbulence | None = None
+    """Turbulence, or None."""
+    gusts: tuple[Gust, ...] = ()
+    """Discrete gusts, added where they overlap."""
+    minimum_speed: float = MINIMUM_SPEED
+    """Slowest passage through the frozen field, for turbulence and for gusts given by length [m/s]."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is out of range (:class:`InputError`)."""
+        _within("minimum_speed", self.minimum_speed, 1.0, 100.0, "m/s")
+
+    @property
+    def turbulent(self) -> bool:
+        """Whether there is turbulence from the start."""
+        return self.turbulence is not None and self.turbulence.wind_at_20_ft > 0.0
+
+    def tables(self) -> GustTables:
+        """Give the parameters that the kernels read."""
+        turbulence = dryden.TurbulenceTables(
+            span=WING_SPAN,
+            minimum_speed=self.minimum_speed,
+            altitude=np.array(_CURVE_HEIGHT_FT) * FOOT,
+            wind=np.array([SEVERITY_WIND[name] for name, _ in _CURVES_FT_S]),
+            intensity=np.array([curve for _, curve in _CURVES_FT_S]) * FOOT,
+        )
+        for array in (turbulence.altitude, turbulence.wind, turbulence.intensity):
+            array.setflags(write=False)
+        return GustTables(turbulence)
+
+
+def new_gust_state(air: AirSpecification, normals: FloatArray | None = None) -> FloatArray:
+    """Give the gust state before the first ``gust_step`` (which has ``dt = 0``).
+
+    Args:
+        air: What the air does.
+        normals: Three standard normals that set the filters in their stationary state; needed where the air is
+            turbulent from the start.
+
+    Returns:
+        The state, shape (SLOTS + slots * SLOT_SIZE,), with room for ``LIVE_SLOTS`` more gusts.
+    """
+    state = np.zeros(kernels.SLOTS + kernels.SLOT_SIZE * (len(air.gusts) + LIVE_SLOTS))
+    for number, gust in enumerate(air.gusts):
+        _fill_slot(state, kernels.SLOTS + number * kernels.SLOT_SIZE, gust)
+    if air.turbulence is not None and air.turbulent:
+        if normals is None:
+            raise ValueError("turbulence needs three standard normals for its first state")
+        set_turbulence(state, air.turbulence, normals)
+    return state
+
+
+def normals_needed(state: FloatArray) -> int:
+    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3.
+
+    Args:
+        state: Gust state.
+    """
+    return kernels.NORMALS_PER_FRAME if state[dryden.T_ACTIVE] != 0.0 else 0
+
+
+def set_turbulence(state: FloatArray, turbulence: Turbulence, normals: FloatArray) -> None:
+    """Let the turbulence move to another severity from now on; a change without fade acts from the next step.
+
+    Args:
+        state: Gust state, changed in place.
+        turbulence: What it becomes; its ``fade_in`` is the time of the change.
+        normals: Three standard normals, used only where there was no turbulence before.
+    """
+    if state[dryden.T_ACTIVE] == 0.0:
+        if turbulence.wind_at_20_ft == 0.0:
+            return
+        state[dryden.T_U], state[dryden.T_W_1], state[dryden.T_W_2] = normals
+        state[dryden.T_ACTIVE] = 1.0
+    target = turbulence.wind_at_20_ft
+    state[dryden.T_WIND_TARGET] = target
+    if turbulence.fade_in > 0.0:
+        state[dryden.T_WIND_RATE] = abs(target - state[dryden.T_WIND]) / turbulence.fade_in
+    else:
+        state[dryden.T_WIND] = target
+
+
+def add_gust(state: FloatArray, gust: Gust) -> None:
+    """Add a gust during a flight; it is felt from the first step after its start.
+
+    Args:
+        state: Gust state, changed in place.
+        gust: The gust.
+
+    Raises:
+        InputError: As many gusts as fit are still acting.
+    """
+    for slot in range(kernels.SLOTS, state.shape[0], kernels.SLOT_SIZE):
+        if state[slot + kernels.SLOT_SHAPE] == kernels.SHAPE_NONE:
+            _fill_slot(state, slot, gust)
+            return
+    raise InputError(
+        "there is no room for another gust",
+        key="gust",
+        allowed=f"{LIVE_SLOTS} live gusts at a time",
+        mend="wait until one is over, or reset the flight (gusts that rise and stay never end)",
+    )
+
+
+def _fill_slot(state: FloatArray, slot: int, gust: Gust) -> None:
+    extent = gust.length if gust.duration is None else gust.duration
+    assert extent is not None  # the gust was checked when it was made
+    state[slot + kernels.SLOT_SHAPE] = GUST_SHAPES[gust.shape]
+    state[slot + kernels.SLOT_START] = gust.start
+    state[slot + kernels.SLOT_FIRST] = gust.ahead
+    state[slot + kernels.SLOT_SECOND] = gust.below
+    state[slot + kernels.SLOT_EXTENT] = extent
+    state[slot + kernels.SLOT_BY_LENGTH] = 0.0 if gust.length is None else 1.0
+    state[slot + kernels.SLOT_BODY] = 1.0 if gust.axes == "body" else 0.0
+    state[slot + kernels.SLOT_TRAVELLED] = 0.0
+
+
+def _within(key: str, value: float, low: float, high: float, unit: str) -> None:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise InputError("is out of range", key=key, value=value, allowed=f"{low:g} to {high:.4g} {unit}")

@@ -1,0 +1,145 @@
+"""Compiled gusts: turbulence and discrete gusts together, turned into the body axes of the plant's gust inputs.
+
+A gust is given by what the aircraft feels: ``ahead`` [m/s] adds to the airspeed (a headwind), ``below`` [m/s] is air
+rising from below (an updraft). Both are positive additions to the air-relative velocity, forward and down.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+
+from rtsim.atmosphere.dryden_kernels import T_SIZE, TurbulenceTables, turbulence_step
+from rtsim.frame import FloatArray
+
+# The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
+G_U = T_SIZE
+"""Gust along body x of the present frame [m/s]."""
+G_W = T_SIZE + 1
+"""Gust along body z of the present frame [m/s]."""
+G_Q = T_SIZE + 2
+"""Pitch gust of the present frame [rad/s]."""
+G_AHEAD = T_SIZE + 3
+"""Horizontal gust of the present frame, from ahead positive: what an airspeed indicator sees of it [m/s]."""
+G_BELOW = T_SIZE + 4
+"""Vertical gust of the present frame, from below positive [m/s]."""
+SLOTS = T_SIZE + 5
+"""Start of the discrete gusts."""
+
+# Places in a slot.
+SLOT_SHAPE = 0
+SLOT_START = 1
+SLOT_FIRST = 2
+"""Amplitude from ahead, or along body x [m/s]."""
+SLOT_SECOND = 3
+"""Amplitude from below, or along body z [m/s]."""
+SLOT_EXTENT = 4
+"""Duration [s] or length [m] of the pulse or of the rise."""
+SLOT_BY_LENGTH = 5
+"""1 if the extent is a length."""
+SLOT_BODY = 6
+"""1 if the amplitudes are along the body axes."""
+SLOT_TRAVELLED = 7
+"""How far the gust has been entered, in the unit of the extent."""
+SLOT_SIZE = 8
+
+SHAPE_NONE, SHAPE_ONE_MINUS_COSINE, SHAPE_BUILD_UP, SHAPE_RAMP = 0, 1, 2, 3
+
+NORMALS_PER_FRAME = 3
+"""Standard normals that the turbulence takes per frame."""
+
+
+class GustTables(NamedTuple):
+    """Parameters of the gusts; read-only. The gusts themselves stand in the state, so that a flight can add some."""
+
+    turbulence: TurbulenceTables
+    """Parameters of the turbulence."""
+
+
+@numba.njit(cache=True, error_model="numpy")
+def gust_shape(shape: float, entered: float, extent: float) -> float:
+    """How much of its amplitude a gust has at a place.
+
+    Args:
+        shape: One of ``SHAPE_*``.
+        entered: How far the gust has been entered; negative before it.
+        extent: Length of the pulse (there and back) or of the rise, in the same unit; 0 is a sharp edge.
+
+    Returns:
+        The share, 0 to 1.
+    """
+    if shape == SHAPE_NONE or entered < 0.0:
+        return 0.0
+    if shape == SHAPE_ONE_MINUS_COSINE:
+        if entered >= extent:
+            return 0.0
+        return 0.5 * (1.0 - math.cos(2.0 * math.pi * entered / extent))
+    if entered >= extent:
+        return 1.0
+    if shape == SHAPE_BUILD_UP:
+        return 0.5 * (1.0 - math.cos(math.pi * entered / extent))
+    return entered / extent
+
+
+@numba.njit(cache=True, error_model="numpy")
+def gust_step(
+    tables: GustTables,
+    state: FloatArray,
+    airspeed: float,
+    altitude: float,
+    pitch: float,
+    time: float,
+    dt: float,
+    normals: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Move the gusts on to a time and give what acts during the frame that starts there.
+
+    Args:
+        tables: Parameters.
+        state: Gust state, updated in place.
+        airspeed: Speed through the undisturbed air [m/s].
+        altitude: Height above the ground [m].
+        pitch: Pitch attitude [rad].
+        time: Time at the start of the frame [s].
+        dt: Length of the frame that ends at ``time``; 0 at the start of the flight [s].
+        normals: Standard normals, shape (3,); not read without turbulence.
+        out: Written: gust along body x and z [m/s], pitch gust [rad/s]; exactly 0.0 where there is none, shape (3,).
+    """
+    ahead, below, rate = turbulence_step(tables.turbulence, state, airspeed, altitude, dt, normals)
+    along_x = 0.0
+    along_z = 0.0
+    through = max(abs(airspeed), tables.turbulence.minimum_speed)
+    for slot in range(SLOTS, state.shape[0], SLOT_SIZE):
+        shape = state[slot + SLOT_SHAPE]
+        since = time - state[slot + SLOT_START]
+        if shape == SHAPE_NONE or since < 0.0:
+            continue
+        if state[slot + SLOT_BY_LENGTH] != 0.0:
+            # A gust that begins within a frame is entered for the rest of that frame only.
+            state[slot + SLOT_TRAVELLED] += through * min(dt, since)
+        else:
+            state[slot + SLOT_TRAVELLED] = since
+        extent = state[slot + SLOT_EXTENT]
+        share = gust_shape(shape, state[slot + SLOT_TRAVELLED], extent)
+        if shape == SHAPE_ONE_MINUS_COSINE and state[slot + SLOT_TRAVELLED] >= extent:
+            state[slot + SLOT_SHAPE] = SHAPE_NONE
+        if state[slot + SLOT_BODY] != 0.0:
+            along_x += share * state[slot + SLOT_FIRST]
+            along_z += share * state[slot + SLOT_SECOND]
+        else:
+            ahead += share * state[slot + SLOT_FIRST]
+            below += share * state[slot + SLOT_SECOND]
+    sine = math.sin(pitch)
+    cosine = math.cos(pitch)
+    # + 0.0 turns a negative zero into zero: a gust of nothing is the same number as no gust.
+    state[G_U] = (ahead * cosine - below * sine + along_x) + 0.0
+    state[G_W] = (ahead * sine + below * cosine + along_z) + 0.0
+    state[G_Q] = rate + 0.0
+    state[G_AHEAD] = (ahead + along_x * cosine + along_z * sine) + 0.0
+    state[G_BELOW] = (below + along_z * cosine - along_x * sine) + 0.0
+    out[0] = state[G_U]
+    out[1] = state[G_W]
+    out[2] = state[G_Q]

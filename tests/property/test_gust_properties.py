@@ -1,0 +1,82 @@
+"""Properties of gusts that hold for any gust, severity, speed and height."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtsim.atmosphere import AirSpecification, Gust, Turbulence, new_gust_state
+from rtsim.atmosphere import dryden_kernels as dryden
+from rtsim.atmosphere.air import GUST_SHAPES
+from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, gust_shape, gust_step
+
+DT = 0.01
+amplitudes = st.floats(-30.0, 30.0)
+speeds = st.floats(-20.0, 130.0)
+heights = st.floats(-5.0, 12_000.0)
+normals = st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3).map(np.array)
+
+
+@st.composite
+def gusts(draw):
+    return Gust(
+        start=draw(st.floats(0.0, 1.0)),
+        ahead=draw(amplitudes),
+        below=draw(amplitudes),
+        shape=draw(st.sampled_from(list(GUST_SHAPES))),
+        axes=draw(st.sampled_from(["earth", "body"])),
+        **{draw(st.sampled_from(["duration", "length"])): draw(st.floats(0.01, 100.0))},
+    )
+
+
+@given(st.sampled_from(list(GUST_SHAPES.values())), st.floats(-10.0, 200.0), st.floats(0.0, 100.0))
+def test_a_shape_is_a_share(shape, entered, extent):
+    assert 0.0 <= gust_shape(shape, entered, extent) <= 1.0
+
+
+@given(st.lists(gusts(), max_size=4), speeds, heights, st.floats(-1.4, 1.4), st.integers(1, 200))
+def test_body_and_earth_components_are_one_vector_within_the_amplitudes(some, speed, height, pitch, frames):
+    air = AirSpecification(gusts=tuple(some))
+    tables, state, out = air.tables(), new_gust_state(air), np.empty(3)
+    for k in range(frames):
+        gust_step(tables, state, speed, height, pitch, k * DT, DT if k else 0.0, np.zeros(0), out)
+    size = np.hypot(out[0], out[1])
+    assert abs(size - np.hypot(state[G_AHEAD], state[G_BELOW])) < 1e-9
+    assert size <= sum(np.hypot(gust.ahead, gust.below) for gust in some) + 1e-9
+    assert out[2] == 0.0
+    # What the airspeed indicator and the climb rate see, from the body components.
+    assert abs(out[0] * np.cos(pitch) + out[1] * np.sin(pitch) - state[G_AHEAD]) < 1e-9
+
+
+@given(st.floats(0.0, 20.0), speeds, heights, st.lists(normals, min_size=1, max_size=20))
+def test_turbulence_is_linear_in_its_normals_and_finite(wind, speed, height, noise):
+    """Twice the noise is twice the gust: the filters are linear whatever the condition."""
+    air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=wind, fade_in=0.0))
+    outs = []
+    for factor in (1.0, 2.0):
+        state, out = new_gust_state(air, factor * noise[0]), np.empty(3)
+        for k, row in enumerate(noise):
+            gust_step(air.tables(), state, speed, height, 0.1, k * DT, DT if k else 0.0, factor * row, out)
+        outs.append(out)
+    assert np.isfinite(outs[0]).all()
+    np.testing.assert_allclose(outs[1], 2.0 * outs[0], rtol=1e-9, atol=1e-12)
+
+
+@given(heights, st.floats(0.0, 30.0), st.floats(0.0, 30.0))
+def test_intensity_grows_with_wind_and_is_never_negative(height, one, two):
+    tables = AirSpecification().tables().turbulence
+    weak = dryden.turbulence_scales(tables, height, min(one, two))
+    strong = dryden.turbulence_scales(tables, height, max(one, two))
+    assert 0.0 <= weak[0] <= strong[0] * (1.0 + 1e-12)
+    assert 0.0 <= weak[1] <= strong[1] * (1.0 + 1e-12)
+    assert weak[2:] == strong[2:]
+    assert min(weak[2:]) > 0.0
+
+
+@given(st.floats(1e-9, 50.0))
+def test_the_vertical_filter_keeps_its_covariance(s):
+    """F F' + G G' = 1 for every distance."""
+    columns = np.array([dryden.advance_second_order(*unit, s, 0.0, 0.0) for unit in ((1.0, 0.0), (0.0, 1.0))]).T
+    noise = np.array([dryden.advance_second_order(0.0, 0.0, s, *unit) for unit in ((1.0, 0.0), (0.0, 1.0))]).T
+    np.testing.assert_allclose(columns @ columns.T + noise @ noise.T, np.eye(2), atol=1e-12)
