@@ -18,40 +18,133 @@ from __future__ import annotations
 import math
 
 import numba
+import numpy as np
 
-from rtsim.aircraft.table_kernels import FloatArray
+from rtsim.aircraft.table_kernels import FloatArray, curve
 from rtsim.aircraft.tables import Configuration, RotorTables
 
 # Entries of the load vector written by rotor_loads.
 THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT = 0, 1, 2, 3, 4, 5
 LOAD_COUNT = 6
+# Rows of the scratch array of one blade position; LIFT and DRAG become the normal and the in-plane force.
+ALPHA, SPEED, UT, UP, LIFT, DRAG = 0, 1, 2, 3, 4, 5
+FLOW_COUNT = 6
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _section(rotor: RotorTables, station: int, alpha: float, mach: float) -> tuple[float, float]:
-    """Lift and drag coefficient: Prandtl-Glauert from the data's Mach number, Lock drag rise relative to it."""
-    # Lift and drag share one grid over the whole circle: one cell and one Hermite basis serve both.
+def _angle(y: float, x: float) -> float:
+    """The angle atan2(y, x) [rad], written out so that the loop over the stations becomes vector instructions.
+
+    Reduction to |t| <= tan(pi/8) and the rational approximation of the Cephes library (S. Moshier), error below 3e-16.
+    """
+    size_y, size_x = abs(y), abs(x)
+    steep = size_y > size_x
+    large = size_y if steep else size_x
+    small = size_x if steep else size_y
+    reduced = small > 0.41421356237309503 * large
+    t = (small - large if reduced else small) / (small + large if reduced else large)
+    z = t * t
+    p = (((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z
+         - 1.228866684490136173410e2) * z - 6.485021904942025371773e1  # fmt: skip
+    q = ((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z
+         + 4.853903996359136964868e2) * z + 1.945506571482613964425e2  # fmt: skip
+    angle = t + t * (z * p / q) + (0.25 * math.pi if reduced else 0.0)
+    angle = 0.5 * math.pi - angle if steep else angle
+    angle = math.pi - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _section_flow(
+    rotor: RotorTables,
+    tangential: tuple[float, float],
+    axial: tuple[float, float],
+    root_pitch: float,
+    flow: FloatArray,
+) -> None:
+    """Write angle of attack, speed, ut and up at every station.
+
+    Args:
+        rotor: The rotor.
+        tangential: ut at the hub and its growth with radius.
+        axial: up at the hub and its growth with radius.
+        root_pitch: Blade pitch without twist [rad].
+        flow: Written: rows ALPHA, SPEED, UT, UP.
+    """
+    for i in range(rotor.stations.shape[0]):
+        r = rotor.stations[i]
+        ut = tangential[0] + tangential[1] * r
+        up = axial[0] + axial[1] * r
+        alpha = root_pitch + rotor.twist[i] - _angle(up, ut)
+        # In reversed flow the difference can leave the circle on which the section tables are printed.
+        alpha = alpha - 2.0 * math.pi if alpha > math.pi else alpha
+        alpha = alpha + 2.0 * math.pi if alpha < -math.pi else alpha
+        flow[ALPHA, i] = alpha
+        flow[SPEED, i] = math.sqrt(ut * ut + up * up)
+        flow[UT, i] = ut
+        flow[UP, i] = up
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
+    """Look up lift and drag coefficient of every station before compressibility.
+
+    Lift and drag share one grid over the whole circle: one cell and one Hermite basis serve both.
+
+    Args:
+        rotor: The rotor.
+        flow: Row ALPHA is read; written: rows LIFT, DRAG.
+    """
     data = rotor.section
-    position = (alpha - rotor.section_start) / rotor.section_step
-    i = min(max(int(position), 0), data.shape[1] - 2)
-    t = position - i
-    t2 = t * t
-    t3 = t2 * t
-    h01 = 3.0 * t2 - 2.0 * t3
-    h00 = 1.0 - h01
-    h10 = t3 - 2.0 * t2 + t
-    h11 = t3 - t2
-    lift = h00 * data[station, i, 0] + h10 * data[station, i, 1] + h01 * data[station, i + 1, 0] + h11 * data[station, i + 1, 1]
-    drag = h00 * data[station, i, 2] + h10 * data[station, i, 3] + h01 * data[station, i + 1, 2] + h11 * data[station, i + 1, 3]
-    mach = min(mach, 0.9)
-    lift *= rotor.reference_glauert[station] / math.sqrt(1.0 - mach * mach)
-    critical = rotor.drag_divergence[station] - 0.1 * abs(lift) - 0.1077
-    excess = max(0.0, mach - critical)
-    excess_reference = max(0.0, rotor.reference_mach[station] - critical)
-    excess *= excess
-    excess_reference *= excess_reference
-    drag += rotor.root_drag[station] + 20.0 * (excess * excess - excess_reference * excess_reference)
-    return lift, max(drag, 0.003)
+    last = data.shape[1] - 2
+    for i in range(rotor.stations.shape[0]):
+        position = (flow[ALPHA, i] - rotor.section_start) / rotor.section_step
+        k = min(max(int(position), 0), last)
+        t = position - k
+        t2 = t * t
+        t3 = t2 * t
+        h01 = 3.0 * t2 - 2.0 * t3
+        h00 = 1.0 - h01
+        h10 = t3 - 2.0 * t2 + t
+        h11 = t3 - t2
+        flow[LIFT, i] = (
+            h00 * data[i, k, 0] + h10 * data[i, k, 1] + h01 * data[i, k + 1, 0] + h11 * data[i, k + 1, 1]
+        )
+        flow[DRAG, i] = (
+            h00 * data[i, k, 2] + h10 * data[i, k, 3] + h01 * data[i, k + 1, 2] + h11 * data[i, k + 1, 3]
+        )
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) -> None:
+    """Turn the coefficients into forces normal to and in the disc plane (overwriting LIFT and DRAG) [N].
+
+    Prandtl-Glauert from the data's Mach number; Lock's drag rise relative to the data's Mach number.
+
+    Args:
+        rotor: The rotor.
+        air: Density and speed of sound.
+        flow: Rows as left by ``_section_tables``; written: LIFT becomes the normal, DRAG the in-plane force.
+    """
+    for i in range(rotor.stations.shape[0]):
+        speed = flow[SPEED, i]
+        mach = speed / air.sound_speed
+        mach = min(mach, 0.9)
+        cl = flow[LIFT, i] * (rotor.reference_glauert[i] / math.sqrt(1.0 - mach * mach))
+        critical = rotor.drag_divergence[i] - 0.1 * abs(cl) - 0.1077
+        excess = mach - critical
+        excess = max(0.0, excess)
+        reference = rotor.reference_mach[i] - critical
+        reference = max(0.0, reference)
+        excess *= excess
+        reference *= reference
+        cd = flow[DRAG, i] + rotor.root_drag[i] + 20.0 * (excess * excess - reference * reference)
+        cd = max(cd, 0.003)
+        scale = 0.5 * air.density * speed * rotor.chord[i] * rotor.widths[i]
+        lift = scale * cl * rotor.lifting[i]
+        drag = scale * cd
+        flow[LIFT, i] = lift * flow[UT, i] - drag * flow[UP, i]
+        flow[DRAG, i] = lift * flow[UP, i] + drag * flow[UT, i]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -73,7 +166,7 @@ def rotor_loads(
         flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
         inflow: l0, l1c, l1s.
         pitch: Collective at 75 % radius, longitudinal cyclic [rad].
-        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of one blade [N m].
+        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
     """
     vf, vt, p = hub
     b0, b0d, b1c, b1cd, b1s, b1sd = flapping
@@ -81,6 +174,8 @@ def rotor_loads(
     om = air.rotor_speed
     tip = om * rotor.radius
     azimuths = rotor.cos_azimuth.shape[0]
+    stations = rotor.stations
+    flow = np.empty((FLOW_COUNT, stations.shape[0]))
     for i in range(LOAD_COUNT):
         loads[i] = 0.0
     for j in range(azimuths):
@@ -90,32 +185,19 @@ def rotor_loads(
         beta_rate = b0d + (b1cd + om * b1s) * c + (b1sd - om * b1c) * s
         root_pitch = pitch[0] + pitch[1] * s + rotor.pitch_flap * (beta - rotor.precone)
         gradient = (l1c * c + l1s * s) / rotor.radius
+        axial = (vt + tip * l0 + vf * beta * c, tip * gradient + beta_rate - p * c)
+        _section_flow(rotor, (vf * s, om), axial, root_pitch, flow)
+        _section_tables(rotor, flow)
+        _section_forces(rotor, air, flow)
         normal_sum = 0.0
         drag_sum = 0.0
         torque_sum = 0.0
         moment_sum = 0.0
-        for i in range(rotor.stations.shape[0]):
-            r = rotor.stations[i]
-            ut = om * r + vf * s
-            up = vt + tip * (l0 + gradient * r) + r * (beta_rate - p * c) + vf * beta * c
-            speed_squared = ut * ut + up * up
-            speed = math.sqrt(speed_squared)
-            alpha = root_pitch + rotor.twist[i] - math.atan2(up, ut)
-            # In reversed flow the difference can leave the circle on which the section tables are printed.
-            if alpha > math.pi:
-                alpha -= 2.0 * math.pi
-            elif alpha < -math.pi:
-                alpha += 2.0 * math.pi
-            cl, cd = _section(rotor, i, alpha, speed / air.sound_speed)
-            scale = 0.5 * air.density * speed * rotor.chord[i] * rotor.widths[i]
-            lift = scale * cl * rotor.lifting[i]
-            drag = scale * cd
-            normal = lift * ut - drag * up
-            tangential = lift * up + drag * ut
-            normal_sum += normal
-            drag_sum += tangential
-            torque_sum += tangential * r
-            moment_sum += normal * r
+        for i in range(stations.shape[0]):
+            normal_sum += flow[LIFT, i]
+            drag_sum += flow[DRAG, i]
+            torque_sum += flow[DRAG, i] * stations[i]
+            moment_sum += flow[LIFT, i] * stations[i]
         loads[THRUST] += normal_sum
         loads[FORWARD_FORCE] += normal_sum * beta * c - drag_sum * s
         loads[TORQUE] += torque_sum
@@ -162,7 +244,11 @@ def flapping_accelerations(
 
 @numba.njit(cache=True, error_model="numpy")
 def inflow_rates(
-    rotor: RotorTables, air: Configuration, hub: tuple[float, float, float], inflow: tuple[float, float, float], loads: FloatArray
+    rotor: RotorTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    inflow: tuple[float, float, float],
+    loads: FloatArray,
 ) -> tuple[float, float, float]:
     """Rates of the three inflow states [1/s].
 
@@ -180,7 +266,8 @@ def inflow_rates(
     thrust_coefficient = loads[THRUST] / force_scale
     moment_scale = 0.5 * rotor.blades / (force_scale * rotor.radius)
     mu = hub[0] / tip
-    momentum = l0 / rotor.induced_factor
+    # Two rotors side by side act as one wing of twice the span: less induced velocity in forward flight.
+    momentum = l0 / (rotor.induced_factor * (1.0 + curve(rotor.side_by_side, 0, abs(mu))))
     through = hub[1] / tip + momentum
     total = max(math.sqrt(mu * mu + through * through), 0.01)
     mass_flow = max((mu * mu + through * (through + momentum)) / total, 0.02)

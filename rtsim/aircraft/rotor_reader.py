@@ -121,4 +121,7 @@ def read_rotor(data: dict[str, Any], choices: dict[str, Any]) -> RotorTables:
         apparent_mass=own["inflow_apparent_mass"],
         gradient_apparent_mass=own["inflow_gradient_apparent_mass"],
         skew_gradient=own["white_blake_gradient"],
+        side_by_side=smooth_curves(
+            [rotor["side_by_side_mu"]], [rotor["side_by_side_XSS"]], np.arange(0.0, 0.3025, 0.0125)
+        ),
     )

@@ -75,6 +75,8 @@ class RotorTables(NamedTuple):
     """Apparent-mass coefficient of the inflow gradients."""
     skew_gradient: float
     """Fore-aft inflow gradient over mean inflow at 90 deg of wake skew."""
+    side_by_side: Curves
+    """Relative change of the induced velocity by the other rotor against in-plane advance ratio."""
 
 
 class WingTables(NamedTuple):
