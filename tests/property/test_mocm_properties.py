@@ -14,7 +14,7 @@ from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.problem import build_problem
 from rtsim.pilot.response import closed_loop
 
-SETTINGS = settings(max_examples=15, deadline=None)
+SETTINGS = settings(max_examples=15, deadline=None, derandomize=True)
 
 
 def double_integrator(**changes: Any) -> dict[str, Any]:
