@@ -51,6 +51,8 @@ class TrimPoint:
     """The residuals closed."""
     residual: float
     """Largest residual, accelerations in m/s^2 and rad/s^2."""
+    unclosed: str = ""
+    """Name of the state whose rate did not close (``elevator``: the stick would have to pass its stop); empty if converged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +141,11 @@ class Xv15:
         }
 
     def trim(self, condition: Condition, guess: TrimPoint | None = None) -> TrimPoint:
-        """Find the level-flight trim; ``converged`` is False where none was found from this guess.
+        """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.
 
         Args:
             condition: The flight condition.
-            guess: A neighbouring trim to start from (continuation); None: searched from hover-like values.
+            guess: A neighbouring trim to start from (continuation); None: the unstalled trim is searched for.
         """
         from rtsim.aircraft.trim import solve_trim
 
