@@ -1,0 +1,195 @@
+"""Time histories and mode strips: which signals share a plot, and how rows become columns of a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from telemetry.log_format import LOG_SIGNALS
+from telemetry.rerun_colours import SERIES
+from telemetry.rerun_corridor import level_of
+
+FLAGS = frozenset({"frame", "time_s", "corridor_level", "on_downstop", "control_on_stop", "pilot_mode"})
+"""Signals that are no curves: the time itself, and states, which the mode strip shows."""
+MODE_NAMES = ("HELICOPTER", "CONVERSION", "AIRPLANE")
+"""States of the mode strip's first line."""
+LEVEL_NAMES = ("CLEAR", "CAUTION", "WARNING", "EXCEEDANCE")
+"""States of the corridor line."""
+PILOT_NAMES = ("MOCM", "EXTERNAL", "HOLD")
+"""States of the pilot line, by ``pilot_mode``."""
+HELICOPTER_FROM_DEG = 85.0
+"""At and above this nacelle angle the aircraft flies as a helicopter [deg]."""
+EVENT_LEVELS = {"info": "INFO", "caution": "WARN", "warning": "ERROR", "exceedance": "CRITICAL"}
+"""Rerun's level for each level of an event."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlotGroup:
+    """Signals of one group and unit: one entity, one plot."""
+
+    path: str
+    """Entity path."""
+    title: str
+    """Title of its view."""
+    columns: tuple[int, ...]
+    """Numbers of its columns in a full row."""
+
+
+def plot_groups() -> tuple[PlotGroup, ...]:
+    """Every signal that is a curve, by group and unit, in declared order."""
+    gathered: dict[tuple[str, str], list[int]] = {}
+    for column, signal in enumerate(LOG_SIGNALS):
+        if signal.name not in FLAGS:
+            gathered.setdefault((signal.group, signal.unit), []).append(column)
+    return tuple(
+        PlotGroup(_path(group, unit), f"{group.capitalize()} [{unit or '-'}]", tuple(columns))
+        for (group, unit), columns in gathered.items()
+    )
+
+
+def plot_path(signal_name: str) -> str:
+    """The entity that carries a signal.
+
+    Args:
+        signal_name: Name of the column.
+    """
+    signal = next(signal for signal in LOG_SIGNALS if signal.name == signal_name)
+    return _path(signal.group, signal.unit)
+
+
+class Plots:
+    """Logs curves, modes and events to one recording."""
+
+    def __init__(self, recording: Any) -> None:
+        """Log names and colours.
+
+        Args:
+            recording: The ``rerun.RecordingStream``.
+        """
+        self._recording = recording
+        self._groups = plot_groups()
+        self._states: dict[str, str] = {}
+        for group in self._groups:
+            names = [_label(LOG_SIGNALS[column].name) for column in group.columns]
+            colours = [SERIES[index % len(SERIES)] for index in range(len(names))]
+            recording.log(group.path, rr.SeriesLines(names=names, colors=colours, widths=[1.6]), static=True)
+        for path, states, state_colours in (
+            ("events/mode", MODE_NAMES, ((59, 130, 196), (201, 138, 43), (76, 159, 112))),
+            ("events/corridor", LEVEL_NAMES, ((47, 125, 79), (224, 176, 48), (240, 128, 48), (224, 72, 72))),
+            ("events/pilot", PILOT_NAMES, ((91, 107, 140), (140, 91, 134), (119, 119, 119))),
+        ):
+            configuration = rr.StateConfiguration(values=states, labels=states, colors=state_colours)
+            recording.log(path, configuration, static=True)
+
+    def send_rows(self, rows: FloatArray) -> None:
+        """Add rows to the curves.
+
+        Args:
+            rows: Full rows, shape (rows, ROW_WIDTH), times ascending.
+        """
+        if not len(rows):
+            return
+        times = [
+            rr.TimeColumn("sim_time", duration=rows[:, COLUMN.time_s]),
+            rr.TimeColumn("step", sequence=rows[:, COLUMN.frame].astype(np.int64)),
+        ]
+        for group in self._groups:
+            width = len(group.columns)
+            values = np.ascontiguousarray(rows[:, group.columns]).reshape(-1)
+            columns = rr.Scalars.columns(scalars=values).partition([width] * len(rows))
+            self._recording.send_columns(group.path, indexes=times, columns=columns)
+
+    def update_states(self, rows: FloatArray) -> None:
+        """Log every change of mode, corridor level and pilot, at the frame in which it happened.
+
+        Args:
+            rows: Consecutive full rows.
+        """
+        if not len(rows):
+            return
+        keys = np.stack(
+            [
+                rows[:, COLUMN.on_downstop],
+                rows[:, COLUMN.nacelle_deg] >= HELICOPTER_FROM_DEG,
+                rows[:, COLUMN.corridor_level],
+                rows[:, COLUMN.pilot_mode],
+            ],
+            axis=1,
+        )
+        changed = np.flatnonzero(np.any(np.diff(keys, axis=0) != 0.0, axis=1)) + 1
+        for index in (0, *changed):
+            self._log_states(rows[index])
+
+    def event(self, text: str, level: str) -> None:
+        """Add a line to the event log at the recording's current time.
+
+        Args:
+            text: What happened.
+            level: ``info``, ``caution``, ``warning`` or ``exceedance``.
+        """
+        self._recording.log("events/log", rr.TextLog(text, level=EVENT_LEVELS.get(level, "INFO")))
+
+    def _log_states(self, row: FloatArray) -> None:
+        converting = int(row[COLUMN.nacelle_deg] < HELICOPTER_FROM_DEG)
+        mode = MODE_NAMES[2] if row[COLUMN.on_downstop] else MODE_NAMES[converting]
+        pilot = int(row[COLUMN.pilot_mode])
+        now = {
+            "mode": mode,
+            "corridor": LEVEL_NAMES[level_of(row)],
+            "pilot": PILOT_NAMES[pilot] if 0 <= pilot < len(PILOT_NAMES) else PILOT_NAMES[1],
+        }
+        for name, state in now.items():
+            before = self._states.get(name)
+            if before == state:
+                continue
+            self._states[name] = state
+            set_row_time(self._recording, row)
+            self._recording.log(f"events/{name}", rr.StateChange(state=state))
+            if name == "corridor":
+                self._log_level(row, before)
+            elif before is not None:
+                self.event(f"{name.capitalize()}: {state.lower()}", "info")
+
+    def _log_level(self, row: FloatArray, before: str | None) -> None:
+        """A line for the event log whenever the corridor level changes."""
+        level = level_of(row)
+        if before is None and level == 0:
+            return
+        side = "low" if row[COLUMN.margin_low_kt] <= row[COLUMN.margin_high_kt] else "high"
+        words = "clear again" if level == 0 else LEVEL_NAMES[level].lower()
+        text = f"Corridor {words}: {row[COLUMN.margin_kt]:+.1f} kn to the {side}-speed side"
+        self.event(text, ("info", "caution", "warning", "exceedance")[level])
+
+
+def set_row_time(recording: Any, row: FloatArray) -> None:
+    """Set the recording's time to a row's.
+
+    Args:
+        recording: The ``rerun.RecordingStream``.
+        row: A frame's signals.
+    """
+    recording.set_time("sim_time", duration=float(row[COLUMN.time_s]))
+    recording.set_time("step", sequence=int(row[COLUMN.frame]))
+
+
+def history_of(row: FloatArray) -> FloatArray:
+    """The signals of a full row.
+
+    Args:
+        row: A row of ``SIGNALS`` then ``TIMING_SIGNALS``.
+    """
+    return row[:SIGNAL_COUNT]
+
+
+def _path(group: str, unit: str) -> str:
+    """Entity path of a group and unit, in characters that need no quotes."""
+    plain = unit.replace("/", "_per_").replace(" ", "_") or "plain"
+    return f"plots/{group}/{plain}"
+
+
+def _label(name: str) -> str:
+    return name.replace("_", " ")
