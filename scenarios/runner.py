@@ -95,21 +95,21 @@ def fly(
     refuse_unavailable(scenario)
     policy = OverrunPolicy.parse(overrun_policy)
     outputs = outputs if outputs is not None else FlightOutputs()
-    # Whatever can be refused is refused before a log is begun or a viewer opened.
-    simulation = Simulation(flight_setup(scenario))
-    session = FlightSession(
-        simulation,
-        frames=flight_frames(scenario),
-        events=scenario.events,
-        pilot_factory=load_pilot(scenario.pilot),
-        pilot_name=scenario.pilot,
-    )
+    pilot_factory = load_pilot(scenario.pilot)
     live = speed != "max"
     log: Recorder | None = None
-    view: RerunView | None = None
+    # The view needs a second to start, in its own process, while this one loads the aircraft.
+    view = _start_view(scenario, outputs)
     try:
+        simulation = Simulation(flight_setup(scenario))
+        session = FlightSession(
+            simulation,
+            frames=flight_frames(scenario),
+            events=scenario.events,
+            pilot_factory=pilot_factory,
+            pilot_name=scenario.pilot,
+        )
         log = _start_log(scenario, simulation, outputs, live=live)
-        view = _start_view(scenario, outputs)
         sinks = FlightSinks(
             log=log,
             view=view,

@@ -92,10 +92,12 @@ class FlightSession:
         """
         if self._next_due < len(self._due):
             self._start_due_events()
+        simulation = self.simulation
         command = None
-        if self._pilot is not None and self.simulation.mode == "external":
+        if self._pilot is not None and simulation.mode == "external":
             command = self._ask_pilot(self._pilot)
-        row = self.simulation.step(command)
+        # A run of one frame is the same frame as a step, in one call of compiled code instead of three.
+        row: FloatArray = simulation.run(1)[0] if command is None else simulation.step(command)
         self.rows += 1
         return row
 

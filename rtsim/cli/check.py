@@ -81,14 +81,9 @@ def _database_problems(path: Path) -> list[str]:
     if not path.is_file():
         return [str(InputError("does not exist", file=str(path), mend="check the path"))]
     try:
-        if path.suffix == ".mat":
-            from rtsim.lpv.exchange import import_database
+        from rtsim.lpv.database import load_database
 
-            import_database(path)
-        else:
-            from rtsim.lpv.database import load_database
-
-            load_database(path)
+        load_database(path)
     except RtsimError as error:
         return [str(error)]
     return []

@@ -39,6 +39,8 @@ class FlightScreen:
             control: Tells whether the flight is paused, and its speed.
             paced: Whether it is flown on the wall clock.
         """
+        self.first_frame_s: float | None = None
+        """How long after the command the first frame began [s]."""
         self._scenario, self._control, self._paced = scenario, control, paced
         self._row: FloatArray | None = None
         self._events: deque[LogEvent] = deque()
@@ -186,17 +188,19 @@ def describe(scenario: Scenario, *, speed: float, outputs: list[str]) -> None:
         say(line)
 
 
-def summarize(record: FlightRecord) -> None:
+def summarize(record: FlightRecord, *, first_frame_s: float | None) -> None:
     """Tell how a flight went.
 
     Args:
         record: The flight.
+        first_frame_s: How long after the command it began [s]; None where that is not known.
     """
     timing, metrics = record.timing, record.metrics
     ending = "Completed" if record.completed else "Ended early"
+    began = "" if first_frame_s is None else f"; first frame {first_frame_s:.2f} s after the command"
     say(
         f"{ending}: {record.end_reason}; {timing.frames} frames, {timing.duration_s:.1f} s in {timing.wall_s:.2f} s "
-        f"({timing.real_time_factor:.1f} x real time)",
+        f"({timing.real_time_factor:.1f} x real time){began}",
     )
     if metrics is not None:
         _print_metrics(record.summary())

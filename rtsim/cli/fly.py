@@ -136,7 +136,7 @@ def fly_command(
     refuse_unavailable(chosen)
     load_pilot(chosen.pilot)
     view = _view_options(headless=headless, record=record, layout=layout)
-    flight, code = _fly(
+    flight, first_frame_s, code = _fly(
         chosen,
         speed=pace,
         view=view,
@@ -145,7 +145,8 @@ def fly_command(
     )
     if json:
         places = {"log": log, "record": record}
-        emit_json({**flight.summary(), **{key: str(path) for key, path in places.items() if path is not None}})
+        given = {key: str(path) for key, path in places.items() if path is not None}
+        emit_json({**flight.summary(), "first_frame_s": first_frame_s, **given})
     if code:
         if flight.failure is not None:
             say(f"Also: {flight.failure}")
@@ -190,6 +191,16 @@ def parse_speed(text: str) -> float:
     return checked_speed(speed)
 
 
+def process_age_s() -> float | None:
+    """Time since this process was started [s], to 0.01 s; None where the system does not tell."""
+    try:
+        started_ticks = int(Path("/proc/self/stat").read_text(encoding="ascii").rpartition(")")[2].split()[19])
+        uptime_s = float(Path("/proc/uptime").read_text(encoding="ascii").split()[0])
+    except (OSError, ValueError, IndexError):
+        return None
+    return uptime_s - started_ticks / os.sysconf("SC_CLK_TCK")
+
+
 def _view_options(*, headless: bool, record: Path | None, layout: Literal["pilot", "engineer"]) -> ViewOptions | None:
     """What to show; None for nothing. Without a display the viewer is left out, which is said."""
     from telemetry.view_options import ViewOptions, display_available
@@ -212,8 +223,8 @@ def _fly(
     view: ViewOptions | None,
     outputs: dict[str, Any],
     policy: str,
-) -> tuple[FlightRecord, int]:
-    """Fly and summarize; gives the record, and the exit code where a signal ended the flight (else 0)."""
+) -> tuple[FlightRecord, float | None, int]:
+    """Fly and summarize; gives the record, when it began, and the exit code where a signal ended it (else 0)."""
     from rtsim.realtime.control import FlightControl
     from rtsim.realtime.keys import KEY_HELP, KeyReader
 
@@ -234,6 +245,7 @@ def _fly(
         def on_start() -> None:
             started()
             signals.arm()
+            screen.first_frame_s = process_age_s()
 
         wanted = FlightOutputs(
             **outputs,
@@ -251,8 +263,8 @@ def _fly(
                 overrun_policy=policy,
                 outputs=wanted,
             )
-    summarize(flight)
-    return flight, EXIT_BY_SIGNAL.get(signals.received, 0) if signals.received else 0
+    summarize(flight, first_frame_s=screen.first_frame_s)
+    return flight, screen.first_frame_s, EXIT_BY_SIGNAL.get(signals.received, 0) if signals.received else 0
 
 
 class StoppingSignals:
