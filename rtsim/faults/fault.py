@@ -1,0 +1,212 @@
+"""Failures as data: what breaks, when, how badly, and whether it mends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rtsim.errors import InputError
+from rtsim.faults import fault_kernels as kernels
+from rtsim.faults.fault_kernels import FaultTables
+from rtsim.frame import FloatArray
+from rtsim.units import DEGREE, HORSEPOWER, KNOT
+
+FaultKind = Literal[
+    "nacelle-jammed",
+    "nacelle-slow",
+    "actuator-stuck",
+    "actuator-slow",
+    "actuator-hard-over",
+    "airspeed-bias",
+    "airspeed-frozen",
+    "engine-limit",
+]
+Actuator = Literal["collective", "cyclic", "elevator"]
+Stop = Literal["low", "high"]
+EngineRating = Literal["contingency", "takeoff", "military", "normal"]
+
+KINDS: dict[FaultKind, int] = {
+    "nacelle-jammed": kernels.KIND_NACELLE_JAMMED,
+    "nacelle-slow": kernels.KIND_NACELLE_SLOW,
+    "actuator-stuck": kernels.KIND_STUCK,
+    "actuator-slow": kernels.KIND_SLOW,
+    "actuator-hard-over": kernels.KIND_HARD_OVER,
+    "airspeed-bias": kernels.KIND_AIRSPEED_BIAS,
+    "airspeed-frozen": kernels.KIND_AIRSPEED_FROZEN,
+    "engine-limit": kernels.KIND_ENGINE_LIMIT,
+}
+"""Failures by name, with their number in the kernels."""
+ACTUATORS: tuple[Actuator, ...] = ("collective", "cyclic", "elevator")
+"""Actuators that can fail, in the order of the aircraft's states."""
+ENGINE_RATING: dict[EngineRating, float] = {
+    "contingency": 1802.0 * HORSEPOWER,
+    "takeoff": 1550.0 * HORSEPOWER,
+    "military": 1401.0 * HORSEPOWER,
+    "normal": 1250.0 * HORSEPOWER,
+}
+"""Power of one LTC1K-4K engine by rating [W] (NASA TM X-62407)."""
+TRANSMISSION_EFFICIENCY = 0.93
+"""Shaft power of the rotors over engine power (NASA TM X-62407)."""
+HARD_OVER_RATE = 20.0 * DEGREE
+"""Rate of a hard-over that gives none [rad/s]: assumed, the XV-15's actuator rates are not published."""
+GOVERNOR_FREQUENCY = 3.0
+"""How fast the governor takes collective off [rad/s]: assumed, half the bandwidth of the collective's actuator."""
+POWER_PER_COLLECTIVE = 200.0 * HORSEPOWER / DEGREE
+"""Shaft power of both rotors per collective without axial flow [W/rad]; fitted to the database, docs/faults.md."""
+POWER_PER_COLLECTIVE_SPEED = 7.5 * HORSEPOWER / DEGREE / KNOT
+"""Its growth with the airspeed along the mast [W s/(rad m)]; fitted likewise."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """One failure. SI and radians; each kind takes exactly the fields that belong to it."""
+
+    kind: FaultKind
+    """What fails."""
+    start: float
+    """When; it acts from the first frame at or after this time [s]."""
+    end: float | None = None
+    """When it mends [s]; None: never."""
+    actuator: Actuator | None = None
+    """Which actuator (``actuator-...``)."""
+    rate: float | None = None
+    """Fastest motion left (``nacelle-slow``, ``actuator-slow``), or the rate of an ``actuator-hard-over`` [rad/s]."""
+    stop: Stop | None = None
+    """End an ``actuator-hard-over`` runs to: ``low`` is the smallest angle, ``high`` the largest."""
+    bias: float | None = None
+    """What ``airspeed-bias`` adds to the indicated airspeed [m/s]."""
+    power: float | None = None
+    """Power the failing engine still gives with ``engine-limit``, 0 for none [W]."""
+    other_engine: EngineRating = "contingency"
+    """Rating the other engine is run at with ``engine-limit``."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is out of range, missing or without meaning (:class:`InputError`)."""
+        _choice("kind", self.kind, tuple(KINDS))
+        _within("start", self.start, 0.0, 36_000.0, "s")
+        if self.end is not None and not (math.isfinite(self.end) and self.end > self.start):
+            raise InputError("is not after start", key="end", value=self.end, allowed=f"above {self.start:g} s")
+        _choice("other_engine", self.other_engine, tuple(ENGINE_RATING))
+        needed = {
+            "actuator": self.kind.startswith("actuator"),
+            "rate": self.kind in {"nacelle-slow", "actuator-slow"},
+            "stop": self.kind == "actuator-hard-over",
+            "bias": self.kind == "airspeed-bias",
+            "power": self.kind == "engine-limit",
+        }
+        for key, is_needed in needed.items():
+            given = getattr(self, key) is not None
+            if is_needed and not given:
+                raise InputError(f"is missing for {self.kind}", key=key, mend="add it")
+            if given and not is_needed and not (key == "rate" and self.kind == "actuator-hard-over"):
+                raise InputError(f"has no meaning for {self.kind}", key=key, mend="leave it out")
+        self._check_values()
+
+    def _check_values(self) -> None:
+        if self.actuator is not None:
+            _choice("actuator", self.actuator, ACTUATORS)
+        if self.stop is not None:
+            _choice("stop", self.stop, ("low", "high"))
+        if self.rate is not None:
+            smallest = 0.1 * DEGREE if self.kind == "actuator-hard-over" else 0.0
+            _within("rate", self.rate, smallest, 200.0 * DEGREE, "rad/s")
+        if self.bias is not None:
+            _within("bias", self.bias, -100.0 * KNOT, 100.0 * KNOT, "m/s")
+        if self.power is not None:
+            _within("power", self.power, 0.0, ENGINE_RATING["contingency"], "W")
+
+    @property
+    def name(self) -> str:
+        """The failure in one word, as in the event log: ``cyclic-stuck``, ``nacelle-jammed``."""
+        return self.kind if self.actuator is None else self.kind.replace("actuator", self.actuator, 1)
+
+    @property
+    def value(self) -> float:
+        """Its size: rate [rad/s], bias [m/s], shaft power available [W], -1 or 1 for a stop; 0 where there is none."""
+        if self.stop is not None:
+            return 1.0 if self.stop == "high" else -1.0
+        if self.power is not None:
+            return TRANSMISSION_EFFICIENCY * (self.power + ENGINE_RATING[self.other_engine])
+        for number in (self.bias, self.rate):
+            if number is not None:
+                return number
+        return 0.0
+
+    def change(self, *, on: bool, time: float) -> FloatArray:
+        """Give the row of a schedule that lets it begin or end.
+
+        Args:
+            on: Begins; else ends.
+            time: When [s].
+        """
+        channel = 0 if self.actuator is None else ACTUATORS.index(self.actuator)
+        rate = self.rate if self.kind == "actuator-hard-over" and self.rate is not None else HARD_OVER_RATE
+        return np.array([time, KINDS[self.kind], channel, self.value, rate, 1.0 if on else 0.0])
+
+
+@dataclass(frozen=True, slots=True)
+class FaultEvent:
+    """A change as the event log records it."""
+
+    time: float
+    """When [s]."""
+    name: str
+    """The failure, and whether it begins or ends: ``cyclic-stuck on``."""
+    value: float
+    """Its size, see ``Fault.value``."""
+
+
+def fault_events(faults: Sequence[Fault]) -> tuple[FaultEvent, ...]:
+    """Give the changes of a flight's failures in the order in which the kernels make them.
+
+    Args:
+        faults: The failures.
+    """
+    return tuple(
+        FaultEvent(time, f"{fault.name} {'on' if on else 'off'}", fault.value) for time, fault, on in _changes(faults)
+    )
+
+
+def fault_tables(faults: Sequence[Fault]) -> FaultTables:
+    """Give the tables that the kernels read.
+
+    Args:
+        faults: The failures of a flight, in any order.
+    """
+    schedule = np.zeros((0, kernels.SCHEDULE_COLUMNS))
+    changes = _changes(faults)
+    if changes:
+        schedule = np.stack([fault.change(on=on, time=time) for time, fault, on in changes])
+    schedule.setflags(write=False)
+    return FaultTables(
+        schedule=schedule,
+        governor_frequency=GOVERNOR_FREQUENCY,
+        power_per_collective=POWER_PER_COLLECTIVE,
+        power_per_collective_speed=POWER_PER_COLLECTIVE_SPEED,
+    )
+
+
+def new_fault_state() -> FloatArray:
+    """Give the fault state of a sound aircraft, shape (FAULT_STATE_SIZE,)."""
+    return np.zeros(kernels.FAULT_STATE_SIZE)
+
+
+def _changes(faults: Sequence[Fault]) -> list[tuple[float, Fault, bool]]:
+    """All changes in time; at one time what ends goes before what begins, then as listed."""
+    changes = [(fault.start, fault, True) for fault in faults]
+    changes += [(fault.end, fault, False) for fault in faults if fault.end is not None]
+    return sorted(changes, key=lambda change: (change[0], change[2]))
+
+
+def _choice(key: str, value: str, allowed: Sequence[str]) -> None:
+    if value not in allowed:
+        raise InputError("is not known", key=key, value=value, allowed=", ".join(allowed), mend="choose one")
+
+
+def _within(key: str, value: float, low: float, high: float, unit: str) -> None:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise InputError("is out of range", key=key, value=value, allowed=f"{low:.4g} to {high:.4g} {unit}")

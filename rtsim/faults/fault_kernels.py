@@ -1,0 +1,337 @@
+"""Compiled failures: what breaks when, and how it changes commands, actuators and sensors of a frame.
+
+A frame uses them in this order: ``fault_update`` switches failures on and off at the start of the frame;
+``fault_airspeed_error`` and ``fault_nacelle_ok`` give what the sensors show; ``fault_nacelle_rate`` limits the nacelle
+command; ``fault_actuators_begin`` and ``fault_actuators_end`` stand around the plant's step, which knows nothing of
+failures. They work on the states that every plant has (``rtsim.aircraft.signals``). Equations: docs/faults.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+
+from rtsim.aircraft.dynamics_kernels import commanded_controls
+from rtsim.aircraft.signals import STATE
+from rtsim.aircraft.table_kernels import curve
+from rtsim.aircraft.tables import ControlTables
+from rtsim.frame import FloatArray
+
+# Kinds, as numbers in the schedule.
+KIND_NACELLE_JAMMED = 0
+KIND_NACELLE_SLOW = 1
+KIND_STUCK = 2
+KIND_SLOW = 3
+KIND_HARD_OVER = 4
+KIND_AIRSPEED_BIAS = 5
+KIND_AIRSPEED_FROZEN = 6
+KIND_ENGINE_LIMIT = 7
+
+# Columns of the schedule.
+AT_TIME = 0
+AT_KIND = 1
+AT_CHANNEL = 2
+"""Actuator: 0 collective, 1 cyclic, 2 elevator; else unused."""
+AT_VALUE = 3
+"""Rate limit [rad/s], bias [m/s], shaft power available [W], or -1 / 1 for the lower / upper stop; by kind."""
+AT_RATE = 4
+"""Rate towards the stop of a hard-over [rad/s]."""
+AT_ON = 5
+"""1: begins; 0: ends."""
+SCHEDULE_COLUMNS = 6
+
+# Places in the state.
+F_NEXT = 0
+"""Next row of the schedule."""
+F_JAMMED = 1
+"""1 while the nacelles are jammed."""
+F_NACELLE_SLOW = 2
+"""1 while the nacelle rate is limited."""
+F_NACELLE_RATE = 3
+"""Its limit [rad/s]."""
+F_ACTUATOR = 4
+"""Start of three blocks (collective, cyclic, elevator) of ACTUATOR_BLOCK numbers."""
+A_MODE = 0
+"""0 sound, else KIND_STUCK, KIND_SLOW or KIND_HARD_OVER."""
+A_VALUE = 1
+"""Held angle [rad] when stuck, rate limit [rad/s] when slow, -1 or 1 for the stop of a hard-over."""
+A_RATE = 2
+"""Rate of a hard-over [rad/s]."""
+ACTUATOR_BLOCK = 3
+F_FROZEN = 13
+"""1 while the airspeed indication stands still."""
+F_HELD = 14
+"""The airspeed it stands at [m/s]."""
+F_BIAS = 15
+"""Added to the indicated airspeed [m/s]."""
+F_ENGINE = 16
+"""1 while the power is limited."""
+F_POWER = 17
+"""Shaft power of both rotors that the engines can give [W]."""
+FAULT_STATE_SIZE = 18
+
+MASK_JAMMED, MASK_NACELLE_SLOW, MASK_COLLECTIVE, MASK_CYCLIC, MASK_ELEVATOR, MASK_AIRSPEED, MASK_ENGINE = (
+    1,
+    2,
+    4,
+    8,
+    16,
+    32,
+    64,
+)
+"""Bits of the mask of active failures."""
+
+_SAME_TIME = 1e-9
+"""A failure due this little after the start of a frame begins with that frame [s]; far below any frame."""
+
+
+class FaultTables(NamedTuple):
+    """Parameters of the failures; read-only."""
+
+    schedule: FloatArray
+    """Changes in the order of their times, shape (changes, SCHEDULE_COLUMNS)."""
+    governor_frequency: float
+    """How fast the governor takes collective off when the power does not suffice [rad/s]."""
+    power_per_collective: float
+    """Shaft power of both rotors per collective angle without axial flow [W/rad]."""
+    power_per_collective_speed: float
+    """Its growth with the airspeed along the mast [W s/(rad m)]."""
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_apply(
+    state: FloatArray, change: FloatArray, x: FloatArray, nacelle: FloatArray, frequency: float, airspeed: float
+) -> None:
+    """Let one failure begin or end.
+
+    Args:
+        state: Fault state, changed in place.
+        change: Row of a schedule, shape (SCHEDULE_COLUMNS,).
+        x: Aircraft state.
+        nacelle: Conversion actuator: command angle, angle, rate; a jam sets the command angle.
+        frequency: Natural frequency of the conversion actuator [rad/s].
+        airspeed: What a sound airspeed indicator shows [m/s].
+    """
+    kind = int(change[AT_KIND])
+    on = change[AT_ON]
+    value = change[AT_VALUE]
+    if kind == KIND_NACELLE_JAMMED:
+        if on != 0.0 and state[F_JAMMED] == 0.0:
+            # From here the critically damped actuator runs out as one exponential: it never turns back.
+            nacelle[0] = nacelle[1] + nacelle[2] / frequency
+        state[F_JAMMED] = on
+    elif kind == KIND_NACELLE_SLOW:
+        state[F_NACELLE_SLOW] = on
+        state[F_NACELLE_RATE] = value
+    elif KIND_STUCK <= kind <= KIND_HARD_OVER:
+        channel = int(change[AT_CHANNEL])
+        place = F_ACTUATOR + ACTUATOR_BLOCK * channel
+        if on != 0.0:
+            state[place + A_MODE] = kind
+            state[place + A_VALUE] = x[STATE.collective_75 + channel] if kind == KIND_STUCK else value
+            state[place + A_RATE] = change[AT_RATE]
+        elif state[place + A_MODE] == kind:
+            state[place + A_MODE] = 0.0
+    elif kind == KIND_AIRSPEED_BIAS:
+        state[F_BIAS] = value if on != 0.0 else 0.0
+    elif kind == KIND_AIRSPEED_FROZEN:
+        if on != 0.0 and state[F_FROZEN] == 0.0:
+            state[F_HELD] = airspeed + state[F_BIAS]
+        state[F_FROZEN] = on
+    elif kind == KIND_ENGINE_LIMIT:
+        state[F_ENGINE] = on
+        state[F_POWER] = value
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_update(
+    tables: FaultTables,
+    state: FloatArray,
+    time: float,
+    x: FloatArray,
+    nacelle: FloatArray,
+    frequency: float,
+    airspeed: float,
+) -> None:
+    """Let every scheduled failure begin or end that is due at the start of this frame.
+
+    Args:
+        tables: Schedule.
+        state: Fault state, changed in place.
+        time: Time at the start of the frame [s].
+        x: Aircraft state.
+        nacelle: Conversion actuator; a jam sets its command angle.
+        frequency: Natural frequency of the conversion actuator [rad/s].
+        airspeed: What a sound airspeed indicator shows [m/s].
+    """
+    number = int(state[F_NEXT])
+    while number < tables.schedule.shape[0] and tables.schedule[number, AT_TIME] <= time + _SAME_TIME:
+        fault_apply(state, tables.schedule[number], x, nacelle, frequency, airspeed)
+        number += 1
+    state[F_NEXT] = number
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_mask(state: FloatArray) -> int:
+    """Give the active failures as a sum of ``MASK_*``.
+
+    Args:
+        state: Fault state.
+    """
+    mask = 0
+    if state[F_JAMMED] != 0.0:
+        mask |= MASK_JAMMED
+    if state[F_NACELLE_SLOW] != 0.0:
+        mask |= MASK_NACELLE_SLOW
+    for channel in range(3):
+        if state[F_ACTUATOR + ACTUATOR_BLOCK * channel] != 0.0:
+            mask |= MASK_COLLECTIVE << channel
+    if state[F_FROZEN] != 0.0 or state[F_BIAS] != 0.0:
+        mask |= MASK_AIRSPEED
+    if state[F_ENGINE] != 0.0:
+        mask |= MASK_ENGINE
+    return mask
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_nacelle_ok(state: FloatArray) -> bool:
+    """Tell whether the conversion actuator follows its commands, however slowly.
+
+    Args:
+        state: Fault state.
+    """
+    return state[F_JAMMED] == 0.0
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_airspeed_error(state: FloatArray, airspeed: float) -> float:
+    """Give what the airspeed indication is wrong by [m/s]; exactly 0.0 where it is sound.
+
+    Args:
+        state: Fault state.
+        airspeed: What a sound indicator shows [m/s].
+    """
+    if state[F_FROZEN] != 0.0:
+        return state[F_HELD] - airspeed
+    return state[F_BIAS]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
+    """Limit the nacelle rate to what the failed conversion actuator can do.
+
+    Args:
+        state: Fault state.
+        rate: Rate commanded [rad/s].
+
+    Returns:
+        The rate that acts [rad/s]; the commanded one where nothing has failed.
+    """
+    if state[F_JAMMED] != 0.0:
+        return 0.0
+    if state[F_NACELLE_SLOW] != 0.0:
+        limit = state[F_NACELLE_RATE]
+        return min(max(rate, -limit), limit)
+    return rate
+
+
+@numba.njit(cache=True, error_model="numpy")
+def collective_rate_limit(
+    tables: FaultTables, state: FloatArray, x: FloatArray, nacelle_angle: float, power: float
+) -> float:
+    """Fastest rise of the collective that the governor allows with the power at hand [rad/s]; negative: it must fall.
+
+    Args:
+        tables: Governor.
+        state: Fault state with a limited engine.
+        x: Aircraft state.
+        nacelle_angle: Nacelle angle [rad].
+        power: Shaft power of both rotors now [W].
+    """
+    along_mast = x[STATE.u] * math.cos(nacelle_angle) - x[STATE.w] * math.sin(nacelle_angle)
+    slope = tables.power_per_collective + tables.power_per_collective_speed * max(along_mast, 0.0)
+    return tables.governor_frequency * (state[F_POWER] - power) / slope
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_actuators_begin(
+    tables: FaultTables,
+    state: FloatArray,
+    controls: ControlTables,
+    x: FloatArray,
+    commands: tuple[float, float],
+    nacelle_angle: float,
+    power: float,
+    dt: float,
+    planned: FloatArray,
+) -> None:
+    """Prepare the plant's step: decide where failed actuators will stand after it and make their mean over it right.
+
+    The plant moves an actuator by its own lag. A failed one is set, for the step alone, to the start from which that
+    motion has the mean of the failed motion; ``fault_actuators_end`` then puts it where the failure leaves it. What the
+    plant feels differs from the failed motion only by a ripple of zero mean within the frame.
+
+    Args:
+        tables: Governor.
+        state: Fault state.
+        controls: Gearing, limits and lags of the actuators.
+        x: Aircraft state at the start of the step; failed actuators are changed.
+        commands: Stick and lever of the step.
+        nacelle_angle: Nacelle angle in the middle of the step [rad].
+        power: Shaft power of both rotors now [W].
+        dt: Length of the step [s].
+        planned: Written: angles of the actuators after the step; NaN where the plant's own are right, shape (3,).
+    """
+    planned[0] = planned[1] = planned[2] = math.nan
+    limited = state[F_ENGINE] != 0.0
+    failed = state[F_ACTUATOR] != 0.0 or state[F_ACTUATOR + ACTUATOR_BLOCK] != 0.0
+    failed = failed or state[F_ACTUATOR + 2 * ACTUATOR_BLOCK] != 0.0
+    if not (limited or failed):
+        return
+    collective, cyclic, elevator = commanded_controls(controls, commands[0], commands[1], nacelle_angle)
+    low = curve(controls.collective_range, 0, nacelle_angle)
+    high = curve(controls.collective_range, 1, nacelle_angle)
+    for channel in range(3):
+        place = F_ACTUATOR + ACTUATOR_BLOCK * channel
+        mode = state[place + A_MODE]
+        begin = x[STATE.collective_75 + channel]
+        command, lower, upper = collective, low, high
+        if channel == 1:
+            command, lower, upper = cyclic, -controls.cyclic_limit, controls.cyclic_limit
+        elif channel == 2:
+            command, lower, upper = elevator, -controls.elevator_limit, controls.elevator_limit
+        gone = -math.expm1(-controls.actuator_rate[channel] * dt)
+        own = begin + gone * (command - begin)
+        end = own
+        if mode == KIND_STUCK:
+            end = state[place + A_VALUE]
+        elif mode == KIND_SLOW:
+            most = state[place + A_VALUE] * dt
+            end = min(max(own, begin - most), begin + most)
+        elif mode == KIND_HARD_OVER:
+            most = state[place + A_RATE] * dt
+            stop = upper if state[place + A_VALUE] > 0.0 else lower
+            end = begin + min(max(stop - begin, -most), most)
+        # A stuck or run-away collective is beyond the governor's reach.
+        if channel == 0 and limited and mode != KIND_STUCK and mode != KIND_HARD_OVER:  # noqa: PLR1714
+            rise = collective_rate_limit(tables, state, x, nacelle_angle, power) * dt
+            end = min(end, max(begin + rise, min(lower, begin)))
+        if end != own:
+            planned[channel] = end
+            mean = 0.5 * (begin + end)
+            x[STATE.collective_75 + channel] = (mean - 0.5 * gone * command) / (1.0 - 0.5 * gone)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def fault_actuators_end(planned: FloatArray, x: FloatArray) -> None:
+    """Put the failed actuators where they are after the plant's step.
+
+    Args:
+        planned: From ``fault_actuators_begin``.
+        x: Aircraft state after the step; failed actuators are changed.
+    """
+    for channel in range(3):
+        if not math.isnan(planned[channel]):
+            x[STATE.collective_75 + channel] = planned[channel]
