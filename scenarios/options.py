@@ -64,11 +64,8 @@ def chosen_scenario(name_or_path: str | None, overrides: Overrides) -> Scenario:
         InputError: If an option is out of range or the start does not lie on the programme.
     """
     if name_or_path is None and overrides.moves_start:
-        scenario = _held(load_scenario("hover"), overrides)
-    else:
-        scenario = load_scenario(DEFAULT_SCENARIO if name_or_path is None else name_or_path)
-        scenario = _displaced(scenario, overrides)
-    return with_overrides(scenario, overrides)
+        return _with_options(_held(load_scenario("hover"), overrides), overrides)
+    return with_overrides(load_scenario(DEFAULT_SCENARIO if name_or_path is None else name_or_path), overrides)
 
 
 def refuse_unavailable(scenario: Scenario) -> None:
@@ -88,12 +85,20 @@ def refuse_unavailable(scenario: Scenario) -> None:
 
 
 def with_overrides(scenario: Scenario, overrides: Overrides) -> Scenario:
-    """Apply everything but the start.
+    """Change a scenario.
 
     Args:
         scenario: What to change.
         overrides: How.
+
+    Raises:
+        InputError: If an option is out of range or the start does not lie on the programme.
     """
+    return _with_options(_displaced(scenario, overrides), overrides)
+
+
+def _with_options(scenario: Scenario, overrides: Overrides) -> Scenario:
+    """Apply everything but the start."""
     plain = {
         name: getattr(overrides, name)
         for name in ("plant", "outer_loop", "pilot", "protection", "corridor", "rate_hz", "seed", "wind", "pilot_noise")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import rtsim
 from rtsim.corridor import load_corridor
-from rtsim.errors import InputError, OutputError
+from rtsim.errors import OutputError
 from rtsim.frame import FloatArray, history_sha256
 from rtsim.realtime import Executive, FlightControl, OverrunPolicy
 from rtsim.realtime.report import TimingReport
@@ -89,8 +89,6 @@ def fly(
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     if overrides is not None:
-        if overrides.moves_start or overrides.altitude is not None:
-            raise InputError("moves the start", key="overrides", mend="use scenarios.options.chosen_scenario")
         scenario = with_overrides(scenario, overrides)
     refuse_unavailable(scenario)
     policy = OverrunPolicy.parse(overrun_policy)

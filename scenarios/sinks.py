@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from rtsim.corridor import LEVEL_NAMES
+from rtsim.errors import OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
 from telemetry.log_format import LogEvent
 
@@ -20,6 +21,11 @@ _DROPPED = [signal.name for signal in TIMING_SIGNALS].index("telemetry_dropped")
 
 class RowLog(Protocol):
     """What the recorder offers to a flight."""
+
+    @property
+    def failure(self) -> OutputError | None:
+        """Why the log stopped growing, once it has."""
+        ...
 
     def push(self, row: FloatArray, timing: FloatArray | None = None) -> None:
         """Keep one row."""
@@ -155,6 +161,8 @@ class FlightSinks:
         self.history.append(row)
         if self._log is not None:
             self._log.push(row, timing)
+            if self._log.failure is not None:
+                self._drop_log(row, self._log.failure)
         if self._watch_corridor and row[COLUMN.corridor_level] != self._level:
             self._tell_level(row)
         if self._on_rows is not None:
@@ -171,6 +179,8 @@ class FlightSinks:
         self.history.extend(rows)
         if self._log is not None:
             self._log.push_block(rows)
+            if self._log.failure is not None:
+                self._drop_log(rows[-1], self._log.failure)
         if self._view is not None:
             self._show_block(self._view, rows)
         if self._watch_corridor:
@@ -194,6 +204,12 @@ class FlightSinks:
             self._view.event(event.text, event.level)
         if self._on_event is not None:
             self._on_event(event)
+
+    def _drop_log(self, row: FloatArray, failure: OutputError) -> None:
+        """Go on without a log that broke, and say so at once."""
+        self._log = None
+        frame, time_s = int(row[COLUMN.frame]), float(row[COLUMN.time_s])
+        self.event(LogEvent(frame, time_s, "log_failed", str(failure), "warning"))
 
     def _show_block(self, view: RowView, rows: FloatArray) -> None:
         """Push rows no faster than the view takes them, so that a recording at full speed has no holes."""
