@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from math import exp
 
-from numba import njit
+from rtsim.compiled import kernel
 
 
-@njit(cache=True)
+@kernel
 def critically_damped_ramp(
     frequency: float, command: float, command_rate: float, value: float, value_rate: float, elapsed: float
 ) -> tuple[float, float, float]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -18,6 +17,7 @@ from rtsim.aids.aids_kernels import LAST_SWITCHES, AidTables, aids_step
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.aircraft.tables import AircraftTables
+from rtsim.compiled import kernel
 from rtsim.corridor.corridor_kernels import CorridorTables, corridor_level_step, corridor_margins
 from rtsim.frame import COLUMN
 from rtsim.lpv.lpv_kernels import LpvTables, lpv_outputs, lpv_step
@@ -138,9 +138,11 @@ class Scratch(NamedTuple):
     """Stick, lever, nacelle rate."""
     hands: FloatArray
     """Stick and lever after protection, before the aids."""
+    asked: FloatArray
+    """The pilot's command in a compiled run: stick, lever, nacelle rate."""
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def programme_at(programme: FloatArray, row: int, time: float) -> float:
     """Value of one row of the programme, linear between its points and held after the last.
 
@@ -166,7 +168,7 @@ def programme_at(programme: FloatArray, row: int, time: float) -> float:
     return programme[row, low] + share * (programme[row, high] - programme[row, low])
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
     """Fill the row with all that is known before the command of this frame; changes no state.
 
@@ -248,7 +250,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.pilot_mode] = state.clock[CLOCK_MODE]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def pilot_command(
     tables: SimulationTables, state: SimulationState, scratch: Scratch, noise: FloatArray, out: FloatArray
 ) -> None:
@@ -269,7 +271,7 @@ def pilot_command(
     out[2] = scratch.target[4]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _end_code(tables: SimulationTables, state: SimulationState) -> int:
     """Whether the flight is over, and how; a landing is judged by sink rate, attitude, speed and rotor clearance."""
     x = state.x
@@ -293,7 +295,7 @@ def _end_code(tables: SimulationTables, state: SimulationState) -> int:
     return END_ATTITUDE if abs(pitch) > LARGEST_PITCH else END_NONE
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def advance(
     tables: SimulationTables,
     state: SimulationState,
@@ -368,7 +370,7 @@ def advance(
     state.clock[CLOCK_END] = _end_code(tables, state)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def run_frames(
     tables: SimulationTables, state: SimulationState, scratch: Scratch, noise: FloatArray, rows: FloatArray
 ) -> int:
@@ -384,7 +386,7 @@ def run_frames(
     Returns:
         The number of frames flown.
     """
-    command = np.empty(3)
+    command = scratch.asked
     for k in range(rows.shape[0]):
         if state.clock[CLOCK_END] != END_NONE:
             return k
@@ -399,7 +401,7 @@ def run_frames(
     return rows.shape[0]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def engage_pilot(tables: SimulationTables, state: SimulationState, scratch: Scratch) -> None:
     """Let the MOCM take the controls as they are: its state is set so that its first output equals them.
 

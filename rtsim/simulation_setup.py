@@ -142,6 +142,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         target=np.zeros(kernels.TARGET_SIZE),
         command=np.zeros(3),
         hands=np.zeros(2),
+        asked=np.zeros(3),
     )
     return Parts(
         tables=tables,

@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
-
 from rtsim.aircraft.signals import STATE
+from rtsim.compiled import kernel
 from rtsim.frame import FloatArray
 
 # Places in the switches; 1 on, 0 off.
@@ -65,7 +64,7 @@ class AidTables(NamedTuple):
     """Nacelle angles between which altitude passes from stick (airplane) to lever (helicopter) [rad]."""
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
     low = 0
     high = axis.shape[0] - 1
@@ -79,7 +78,7 @@ def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
     return low, min(max(share, 0.0), 1.0)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) -> float:
     """Value of one map at a flight condition, bilinear and held outside the grid.
 
@@ -97,7 +96,7 @@ def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) ->
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _beyond(value: float, dead_zone: float) -> float:
     """The part of a deflection beyond the dead zone, rescaled to full travel."""
     if abs(value) <= dead_zone:
@@ -105,12 +104,12 @@ def _beyond(value: float, dead_zone: float) -> float:
     return math.copysign((abs(value) - dead_zone) / (1.0 - dead_zone), value)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _limited(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def _terms(
     tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray
 ) -> tuple[float, float, float, float]:
@@ -166,7 +165,7 @@ def _terms(
     return stick + _limited(added, tables.authority), lever, height_error, speed_error
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def aids_engage(
     tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray, acting: FloatArray
 ) -> None:
@@ -196,7 +195,7 @@ def aids_engage(
         state[LAST_SWITCHES + i] = switches[i]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def aids_step(
     tables: AidTables,
     state: FloatArray,

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from rtsim.compiled import kernel
 from rtsim.units import GRAVITY
 
 FloatArray = npt.NDArray[np.float64]
@@ -104,18 +104,18 @@ class LpvTables(NamedTuple):
     """Form, sizes and positions of the variables that have a meaning here (``R_*``)."""
 
 
-@njit(cache=True)
+@kernel
 def _rows_at(tables: LpvTables) -> int:
     """Where the row sums stand in the work array; the scratch vectors follow at `_scratch_at`."""
     return W_BLEND + max(tables.cells.shape[3], tables.output_cells.shape[3])
 
 
-@njit(cache=True)
+@kernel
 def _scratch_at(tables: LpvTables) -> int:
     return _rows_at(tables) + max(tables.roles[R_ROWS], tables.roles[R_OUTPUT_ROWS])
 
 
-@njit(cache=True)
+@kernel
 def work_size(tables: LpvTables) -> int:
     """Give the length of the work array that the kernels need.
 
@@ -128,7 +128,7 @@ def work_size(tables: LpvTables) -> int:
     return _scratch_at(tables) + 4 * tables.roles[R_STATES] + 2 * tables.roles[R_INPUTS]
 
 
-@njit(cache=True)
+@kernel
 def _cell_below(axis: FloatArray, value: float) -> int:
     """Number of the grid interval that holds a value (clipped to the first and last)."""
     low = 0
@@ -142,7 +142,7 @@ def _cell_below(axis: FloatArray, value: float) -> int:
     return low
 
 
-@njit(cache=True)
+@kernel
 def _smoothstep(s: float) -> float:
     if s <= 0.0:
         return 0.0
@@ -151,7 +151,7 @@ def _smoothstep(s: float) -> float:
     return s * s * (3.0 - 2.0 * s)
 
 
-@njit(cache=True)
+@kernel
 def _layer_step(alpha: float, here: float, beyond: float) -> float:
     """How far the angle of attack has gone from one layer towards the next, smoothed, in [0, 1]."""
     gap = beyond - here
@@ -162,7 +162,7 @@ def _layer_step(alpha: float, here: float, beyond: float) -> float:
     return fade * _smoothstep((alpha - here) / gap)
 
 
-@njit(cache=True)
+@kernel
 def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
     """Angle of attack as used for scheduling: with a headwind of V0 added, so that it is defined in hover.
 
@@ -182,7 +182,7 @@ def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
     return math.atan2(w + headwind * sine, u + headwind * cosine)
 
 
-@njit(cache=True)
+@kernel
 def _locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatArray) -> tuple[int, int]:
     """Find the cell of the present state: corner weights, layer shares and flags into ``work``."""
     roles = tables.roles
@@ -260,7 +260,7 @@ def _locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatA
     return i, j
 
 
-@njit(cache=True)
+@kernel
 def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArray) -> float:
     return (
         work[W_CORNER] * tables.alpha[i, j, layer]
@@ -270,7 +270,7 @@ def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArra
     )
 
 
-@njit(cache=True)
+@kernel
 def _blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, target: FloatArray) -> None:
     """Interpolate the first ``count`` entries of the cells around (i, j)."""
     fresh = True
@@ -295,7 +295,7 @@ def _blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, targ
                 target[k] += w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
 
 
-@njit(cache=True)
+@kernel
 def _apply(
     tables: LpvTables,
     x: FloatArray,
@@ -334,7 +334,7 @@ def _apply(
         _add_rigid_body(roles, x, xdot)
 
 
-@njit(cache=True)
+@kernel
 def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
     """Add gravity, Coriolis and kinematics of the symmetric plane (body axes, z down, altitude up)."""
     u = x[roles[R_U]]
@@ -349,7 +349,7 @@ def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
     xdot[roles[R_ALTITUDE]] += u * sine - w * cosine
 
 
-@njit(cache=True)
+@kernel
 def lpv_derivative(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, xdot: FloatArray, work: FloatArray
 ) -> None:
@@ -382,7 +382,7 @@ def lpv_derivative(
     )
 
 
-@njit(cache=True)
+@kernel
 def lpv_outputs(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, y: FloatArray, work: FloatArray
 ) -> None:
@@ -426,7 +426,7 @@ def lpv_outputs(
         y[k] = total[k]
 
 
-@njit(cache=True)
+@kernel
 def lpv_step(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_path: FloatArray, dt: float, work: FloatArray
 ) -> None:
@@ -489,7 +489,7 @@ def lpv_step(
         x[k] += dt / 6.0 * total[k]
 
 
-@njit(cache=True)
+@kernel
 def lpv_step_steady(
     tables: LpvTables,
     x: FloatArray,
