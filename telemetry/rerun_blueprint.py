@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from telemetry import rerun_corridor, rerun_instruments
 from telemetry.log_format import LOG_SIGNALS
 from telemetry.rerun_colours import BACKGROUND
-from telemetry.rerun_plots import plot_groups, plot_path
+from telemetry.signal_groups import plot_groups, plot_path
 from telemetry.view_options import Layout
 
 SHOWN_SECONDS = 30.0

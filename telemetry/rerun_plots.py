@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,8 @@ from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from telemetry.log_format import LOG_SIGNALS
 from telemetry.rerun_colours import SERIES
 from telemetry.rerun_corridor import level_of
+from telemetry.signal_groups import label, plot_groups
 
-FLAGS = frozenset({"frame", "time_s", "corridor_level", "on_downstop", "control_on_stop", "pilot_mode"})
-"""Signals that are no curves: the time itself, and states, which the mode strip shows."""
 MODE_NAMES = ("HELICOPTER", "CONVERSION", "AIRPLANE")
 """States of the mode strip's first line."""
 LEVEL_NAMES = ("CLEAR", "CAUTION", "WARNING", "EXCEEDANCE")
@@ -25,40 +23,6 @@ HELICOPTER_FROM_DEG = 85.0
 """At and above this nacelle angle the aircraft flies as a helicopter [deg]."""
 EVENT_LEVELS = {"info": "INFO", "caution": "WARN", "warning": "ERROR", "exceedance": "CRITICAL"}
 """Rerun's level for each level of an event."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlotGroup:
-    """Signals of one group and unit: one entity, one plot."""
-
-    path: str
-    """Entity path."""
-    title: str
-    """Title of its view."""
-    columns: tuple[int, ...]
-    """Numbers of its columns in a full row."""
-
-
-def plot_groups() -> tuple[PlotGroup, ...]:
-    """Every signal that is a curve, by group and unit, in declared order."""
-    gathered: dict[tuple[str, str], list[int]] = {}
-    for column, signal in enumerate(LOG_SIGNALS):
-        if signal.name not in FLAGS:
-            gathered.setdefault((signal.group, signal.unit), []).append(column)
-    return tuple(
-        PlotGroup(_path(group, unit), f"{group.capitalize()} [{unit or '-'}]", tuple(columns))
-        for (group, unit), columns in gathered.items()
-    )
-
-
-def plot_path(signal_name: str) -> str:
-    """The entity that carries a signal.
-
-    Args:
-        signal_name: Name of the column.
-    """
-    signal = next(signal for signal in LOG_SIGNALS if signal.name == signal_name)
-    return _path(signal.group, signal.unit)
 
 
 class Plots:
@@ -74,7 +38,7 @@ class Plots:
         self._groups = plot_groups()
         self._states: dict[str, str] = {}
         for group in self._groups:
-            names = [_label(LOG_SIGNALS[column].name) for column in group.columns]
+            names = [label(LOG_SIGNALS[column].name) for column in group.columns]
             colours = [SERIES[index % len(SERIES)] for index in range(len(names))]
             recording.log(group.path, rr.SeriesLines(names=names, colors=colours, widths=[1.6]), static=True)
         for path, states, state_colours in (
@@ -183,13 +147,3 @@ def history_of(row: FloatArray) -> FloatArray:
         row: A row of ``SIGNALS`` then ``TIMING_SIGNALS``.
     """
     return row[:SIGNAL_COUNT]
-
-
-def _path(group: str, unit: str) -> str:
-    """Entity path of a group and unit, in characters that need no quotes."""
-    plain = unit.replace("/", "_per_").replace(" ", "_") or "plain"
-    return f"plots/{group}/{plain}"
-
-
-def _label(name: str) -> str:
-    return name.replace("_", " ")

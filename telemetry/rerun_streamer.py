@@ -23,8 +23,12 @@ from telemetry.view_options import ViewOptions, partial_name
 
 APPLICATION = "rtsim"
 """Application id of every recording."""
-PLOT_PERIOD_S = 0.1
+PLOT_PERIOD_S = 0.2
 """Curves are sent this often: a batch costs as much as a point [s]."""
+FLUSH_PERIOD_S = 0.03
+"""What is logged reaches the viewer after at most this long [s]."""
+UNWATCHED_PERIOD_S = 1.0
+"""Both periods where nobody watches: every chunk costs more than a kilobyte in the file [s]."""
 
 _SERVER_MEMORY = "256MiB"
 
@@ -81,7 +85,7 @@ class Streamer:
                 self._draw(piece[0])  # so that the very beginning can be looked at, too
             self._draw(piece[-1])
         if time.monotonic() >= self._next_plots:
-            self._next_plots = time.monotonic() + PLOT_PERIOD_S
+            self._next_plots = time.monotonic() + (UNWATCHED_PERIOD_S if self._port is None else PLOT_PERIOD_S)
             self._send_plots()
 
     def event(self, text: str, level: str) -> None:
@@ -117,7 +121,9 @@ class Streamer:
         recording = rr.RecordingStream(
             APPLICATION,
             recording_id=f"run-{stamp}{suffix}",
-            batcher_config=rr.ChunkBatcherConfig(flush_tick=0.03),
+            batcher_config=rr.ChunkBatcherConfig(
+                flush_tick=UNWATCHED_PERIOD_S if self._port is None else FLUSH_PERIOD_S
+            ),
         )
         sinks: list[Any] = []
         if self._port is not None and self._host is None:

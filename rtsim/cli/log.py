@@ -1,0 +1,155 @@
+"""``rtsim plot``, ``rtsim log info`` and ``rtsim log export``: what a flight log shows, holds, and gives to others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rtsim.cli.output import console, emit_json, results
+
+if TYPE_CHECKING:
+    from telemetry.log_reader import FlightLog
+
+LogArgument = Annotated[Path, typer.Argument(help="A flight log, as written by rtsim fly --log.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the app.
+
+    Args:
+        app: The ``rtsim`` command.
+    """
+    app.command("plot")(plot_command)
+    group = typer.Typer(no_args_is_help=True, help="What a flight log holds; CSV and MAT for other programs.")
+    group.command("info")(info_command)
+    group.command("export")(export_command)
+    app.add_typer(group, name="log")
+
+
+def plot_command(
+    log: LogArgument,
+    *,
+    out: Annotated[Path | None, typer.Option(help="Directory for the pictures (LOG's name with -plots).")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Draw a recorded flight: corridor, time histories, controls, flapping, margins, timing; as SVG and PNG.
+
+    Args:
+        log: The flight log.
+        out: Directory for the pictures.
+        json: Print one JSON object on stdout.
+
+    Raises:
+        InputError: It is no log, or holds no flight.
+        OutputError: The pictures cannot be written.
+    """
+    from telemetry.flight_plots import plot_flight
+    from telemetry.log_reader import read_log
+
+    flight = read_log(log)
+    files = plot_flight(flight, out or log.with_name(f"{log.stem}-plots"))
+    if json:
+        emit_json({"log": log, "files": files})
+        return
+    for file in files:
+        results.print(str(file), markup=False, soft_wrap=True)
+
+
+def info_command(log: LogArgument, *, json: JsonOption = False) -> None:
+    """Say what a log holds, and whether its rows still have the hash it was closed with.
+
+    Args:
+        log: The flight log.
+        json: Print one JSON object on stdout.
+
+    Raises:
+        InputError: It is no log.
+    """
+    from telemetry.log_reader import read_log
+
+    flight = read_log(log)
+    info = _information(flight)
+    if json:
+        emit_json(info)
+        return
+    _print_information(info)
+
+
+def export_command(
+    log: LogArgument,
+    target: Annotated[Path, typer.Argument(help="File to write: *.csv or *.mat.")],
+    *,
+    json: JsonOption = False,
+) -> None:
+    """Write all signals of a log to a CSV or MAT file.
+
+    Args:
+        log: The flight log.
+        target: File to write; its ending says which kind.
+        json: Print one JSON object on stdout.
+
+    Raises:
+        InputError: It is no log, or the ending is unknown.
+        OutputError: The file cannot be written.
+    """
+    from telemetry.log_export import export_log
+    from telemetry.log_reader import read_log
+
+    flight = read_log(log)
+    export_log(flight, target)
+    if json:
+        emit_json({"log": log, "file": target, "frames": len(flight.rows), "signals": list(flight.names)})
+    else:
+        console.print(f"Wrote {len(flight.rows)} frames to {target}", markup=False, soft_wrap=True)
+
+
+def _information(flight: FlightLog) -> dict[str, Any]:
+    metadata, summary = flight.metadata, dict(flight.summary or {})
+    stated = summary.get("history_sha256")
+    computed = flight.history_sha256()
+    times = flight["time_s"]
+    return {
+        "log": flight.path,
+        "scenario": metadata.scenario_name,
+        "frames": len(flight.rows),
+        "rate_hz": metadata.rate_hz,
+        "duration_s": float(times[-1]) + 1.0 / metadata.rate_hz if len(times) else 0.0,
+        "complete": flight.summary is not None,
+        "end_reason": summary.get("end_reason"),
+        "history_sha256": computed,
+        "hash_matches": None if stated is None else stated == computed,
+        "database_hash": metadata.database_hash,
+        "seed": metadata.seed,
+        "corridor_name": metadata.corridor.name if metadata.corridor else None,
+        "versions": dict(metadata.versions),
+        "setup": dict(metadata.setup),
+        "signals": [{"name": name, "unit": unit} for name, unit in zip(flight.names, flight.units, strict=True)],
+        "events": flight.events,
+        "summary": summary or None,
+    }
+
+
+def _print_information(info: dict[str, Any]) -> None:
+    """The same for people."""
+    hashes = {
+        None: "not stated: the recording was cut off",
+        True: "as stated",
+        False: "NOT as stated: damaged or edited",
+    }
+    lines = [
+        f"Log        {info['log']}",
+        f"Scenario   {info['scenario']}, seed {info['seed']}, corridor {info['corridor_name'] or 'unknown'}",
+        f"Flight     {info['frames']} frames at {info['rate_hz']:g} Hz, {info['duration_s']:.1f} s",
+        f"Ended      {info['end_reason'] or 'cut off: killed, or the disk was full'}",
+        f"History    {info['history_sha256']} ({hashes[info['hash_matches']]})",
+        f"Database   {info['database_hash']}",
+        f"Versions   {', '.join(f'{name} {version}' for name, version in info['versions'].items())}",
+        f"Signals    {len(info['signals'])}: {', '.join(signal['name'] for signal in info['signals'][:6])}, ...",
+        f"Events     {len(info['events'])}",
+    ]
+    lines += [f"  {event.time_s:9.3f} s  {event.level:10}  {event.text}" for event in info["events"]]
+    for line in lines:
+        results.print(line, markup=False, soft_wrap=True)
