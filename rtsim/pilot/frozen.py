@@ -128,9 +128,7 @@ class _Frame:
     def advance(self, x: FloatArray, state: FloatArray) -> FloatArray:
         applied = self.output(x, state)
         after = state.copy()
-        kernels.mocm_advance(
-            self.pilot, after, x, self.nacelle, 0.0, self.reference, applied, self.silence, self.dt
-        )
+        kernels.mocm_advance(self.pilot, after, x, self.nacelle, 0.0, self.reference, applied, self.silence, self.dt)
         return after
 
 

@@ -79,6 +79,22 @@ N_COUNT = 11
 
 SAME_CONTROL = 1e-9
 """Applied and demanded controls closer than this are the same (rounding must not freeze the integrals)."""
+CAPTURE_FREQUENCY = 0.4
+"""After taking over, the pilot leads its own reference from where the aircraft is to what is asked, at this rate [rad/s]."""
+CAPTURE_AIRSPEED_RATE = 1.5
+"""Fastest capture of an airspeed [m/s^2]."""
+CAPTURE_CLIMB = 4.0
+"""Fastest capture of an altitude [m/s]."""
+CAPTURE_AIRSPEED_JERK = 1.5
+"""Largest rate of change of the capture's acceleration [m/s^3]."""
+CAPTURE_CLIMB_RATE = 4.0
+"""Largest vertical acceleration of the capture [m/s^2]."""
+LARGEST_AIRSPEED_ERROR = 10.0
+"""Farther from its reference the pilot gives the reference up and captures it again [m/s]."""
+LARGEST_ALTITUDE_ERROR = 20.0
+"""The same for altitude [m]."""
+OFFSETS = 4
+"""Distance of the pilot's own reference from what is asked: airspeed, its rate, altitude, climb rate."""
 INTEGRALS = 2
 """Airspeed and altitude are integrated."""
 S_FILTERED = 0
@@ -151,7 +167,7 @@ def pilot_state_size(tables: PilotTables) -> int:
     """
     roles = tables.roles
     estimate = roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]
-    return S_ESTIMATE + estimate + roles[R_HANDS] + roles[R_DELAY] + INTEGRALS + roles[R_PLANT]
+    return S_ESTIMATE + estimate + roles[R_HANDS] + roles[R_DELAY] + INTEGRALS + roles[R_PLANT] + OFFSETS
 
 
 @njit(cache=True, error_model="numpy")
@@ -165,6 +181,11 @@ def noise_width(tables: PilotTables) -> int:
         The number.
     """
     return tables.roles[R_DISPLAYS] + tables.roles[R_HANDS]
+
+
+@njit(cache=True, error_model="numpy")
+def _clip(value: float, limit: float) -> float:
+    return min(limit, max(-limit, value))
 
 
 @njit(cache=True, error_model="numpy")
@@ -220,6 +241,25 @@ def _trim(tables: PilotTables, reference: FloatArray, nacelle_angle: float, out:
 
 
 @njit(cache=True, error_model="numpy")
+def _own_reference(state: FloatArray, reference: FloatArray, out: FloatArray) -> None:
+    """What is asked for plus the offset of a capture in progress (zero in ordinary flight)."""
+    first = state.shape[0] - OFFSETS
+    for k in range(OFFSETS):
+        out[k] = reference[k] + state[first + k]
+
+
+@njit(cache=True, error_model="numpy")
+def _capture(state: FloatArray, place: int, limits: tuple[float, float], dt: float) -> None:
+    """Lead one offset and its rate to zero: critically damped, its speed and acceleration limited."""
+    speed, acceleration = limits
+    far = 2.0 * speed / CAPTURE_FREQUENCY
+    offset = _clip(state[place], far)
+    change = _clip(-CAPTURE_FREQUENCY * (CAPTURE_FREQUENCY * offset + 2.0 * state[place + 1]), acceleration)
+    state[place] += dt * (state[place + 1] + 0.5 * dt * change)
+    state[place + 1] += dt * change
+
+
+@njit(cache=True, error_model="numpy")
 def _demand(tables: PilotTables, state: FloatArray, hand: int) -> float:
     """Deviation of a hand's control after the true delay."""
     roles = tables.roles
@@ -258,8 +298,10 @@ def mocm_output(
         noise: Standard normals of this frame (unused).
         out: Receives stick (-1..1) and lever (0..1).
     """
-    work = np.empty(4 * (1 + tables.roles[R_HANDS]))
-    _trim(tables, reference, nacelle_angle, work)
+    work = np.empty(4 * (1 + tables.roles[R_HANDS]) + OFFSETS)
+    own = work[4 * (1 + tables.roles[R_HANDS]) :]
+    _own_reference(state, reference, own)
+    _trim(tables, own, nacelle_angle, work)
     for hand in range(tables.roles[R_HANDS]):
         value = work[1 + hand] + _demand(tables, state, hand)
         out[hand] = min(tables.limits[1, hand], max(tables.limits[0, hand], value))
@@ -501,7 +543,7 @@ def mocm_advance(
     span = size + 4 + seen
     count = 4 * (1 + hands)
     block = roles[R_END]
-    work = np.zeros(count + n + block + motor + hands + 5 * span)
+    work = np.zeros(count + n + block + motor + hands + 3 * span + OFFSETS)
     trim = work[:count]
     target = work[count : count + n]
     cell = work[count + n : count + n + block]
@@ -510,22 +552,23 @@ def mocm_advance(
     y0 = work[start : start + span]
     y1 = work[start + span : start + 2 * span]
     total = work[start + 2 * span : start + 3 * span]
+    own = work[start + 3 * span :]
     integrals_at = S_ESTIMATE + estimate + hands + delay
     last_at = integrals_at + INTEGRALS
+    offset_at = last_at + n
 
     # the moving trim: what it moved since the last frame comes off the estimated deviation
-    _trim(tables, reference, nacelle_angle, trim)
+    _own_reference(state, reference, own)
+    _trim(tables, own, nacelle_angle, trim)
     pitch_rate = (trim[0] - state[last_at + 3]) / dt
-    _plant_reference(tables, reference, trim, pitch_rate, target)
+    _plant_reference(tables, own, trim, pitch_rate, target)
     for k in range(n):
         state[S_ESTIMATE + k] -= target[k] - state[last_at + k]
         state[last_at + k] = target[k]
 
     noisy = noise.shape[0] > 0
-    _interpolate(
-        tables, tables.cells, (state[S_FILTERED], nacelle_angle), (0, block if noisy else roles[R_V]), cell
-    )
-    airspeed = _observe(tables, x, reference, trim[0], pitch_rate, constant[rows : rows + seen])
+    _interpolate(tables, tables.cells, (state[S_FILTERED], nacelle_angle), (0, block if noisy else roles[R_V]), cell)
+    airspeed = _observe(tables, x, own, trim[0], pitch_rate, constant[rows : rows + seen])
     error_v = constant[rows]
     error_h = constant[rows + 1]
     if roles[R_LOOP] == LOOP_INTEGRATORS:
@@ -536,7 +579,7 @@ def mocm_advance(
         dv = -numbers[N_KP_V] * error_v - numbers[N_KI_V] * state[integrals_at]
         dh = -numbers[N_KP_H] * error_h - numbers[N_KI_H] * state[integrals_at + 1]
         for hand in range(hands):
-            constant[command + hand] = _outer_command(tables, cell, trim, reference[REF_AIRSPEED], dv, dh, hand)
+            constant[command + hand] = _outer_command(tables, cell, trim, own[REF_AIRSPEED], dv, dh, hand)
 
     # known accelerations of the moving trim, nacelle motion, and what stops or protection did to the controls
     sine = math.sin(trim[0])
@@ -549,8 +592,8 @@ def mocm_advance(
         constant[k] = cell[roles[R_N] + k] * nacelle_rate
         if pitch_column >= 0:
             constant[k] += cell[pitch_column + k] * pitch_rate
-    constant[0] += reference[REF_AIRSPEED_RATE] * cosine
-    constant[1] += reference[REF_AIRSPEED_RATE] * sine
+    constant[0] += own[REF_AIRSPEED_RATE] * cosine
+    constant[1] += own[REF_AIRSPEED_RATE] * sine
     frozen = _limit_hands(tables, cell, state, trim, constant)
     for hand in range(hands):
         overruled = applied[hand] - (trim[1 + hand] + _demand(tables, state, hand))
@@ -590,13 +633,13 @@ def mocm_advance(
     if not frozen:
         state[integrals_at] += dt * error_v
         state[integrals_at + 1] += dt * error_h
+    # capture: lead the own reference on, and give it up where the aircraft is too far from it
+    _capture(state, offset_at, (CAPTURE_AIRSPEED_RATE, CAPTURE_AIRSPEED_JERK), dt)
+    _capture(state, offset_at + 2, (CAPTURE_CLIMB, CAPTURE_CLIMB_RATE), dt)
+    state[offset_at] += error_v - _clip(error_v, LARGEST_AIRSPEED_ERROR)
+    state[offset_at + 2] += error_h - _clip(error_h, LARGEST_ALTITUDE_ERROR)
     state[S_FILTERED] += tables.numbers[N_FILTER] * (airspeed - state[S_FILTERED])
     state[S_LIMITED] = 1.0 if frozen else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def _clip(value: float, limit: float) -> float:
-    return min(limit, max(-limit, value))
 
 
 @njit(cache=True, error_model="numpy")
@@ -611,7 +654,8 @@ def mocm_engage(
 ) -> None:
     """Let the pilot take over without a step: its first output is the present stick and lever.
 
-    The estimate starts at the true deviations, without gusts. The integrals are set so that the present controls are
+    The pilot's own reference starts at the present airspeed, altitude and climb rate and leads from there to what is
+    asked for. The estimate starts at the true deviations, without gusts. The integrals are set so that the present controls are
     also what the pilot wants, as far as their limits allow; from there it steers to the reference.
 
     Args:
@@ -637,11 +681,18 @@ def mocm_engage(
     cell = np.zeros(roles[R_END])
     for k in range(state.shape[0]):
         state[k] = 0.0
-    _trim(tables, reference, nacelle_angle, trim)
-    airspeed = _observe(tables, x, reference, trim[0], 0.0, errors)
+    own = np.zeros(OFFSETS)
+    airspeed = _observe(tables, x, reference, 0.0, 0.0, errors)
     state[S_FILTERED] = airspeed
+    offset_at = last_at + n
+    state[offset_at] = errors[0]
+    state[offset_at + 2] = errors[1]
+    state[offset_at + 3] = errors[2]
+    _own_reference(state, reference, own)
+    _trim(tables, own, nacelle_angle, trim)
+    _observe(tables, x, own, trim[0], 0.0, errors)
     _interpolate(tables, tables.cells, (airspeed, nacelle_angle), (0, roles[R_END]), cell)
-    _plant_reference(tables, reference, trim, 0.0, state[last_at : last_at + n])
+    _plant_reference(tables, own, trim, 0.0, state[last_at : last_at + n])
     state[S_ESTIMATE + 0] = x[roles[R_U]] - state[last_at + 0]
     state[S_ESTIMATE + 1] = x[roles[R_W]] - state[last_at + 1]
     state[S_ESTIMATE + 2] = x[roles[R_Q]]
@@ -655,7 +706,7 @@ def mocm_engage(
         state[hands_at + hand] = held
     _rest_delay(tables, tables.model_delay_a, state, hands_at, S_ESTIMATE + n)
     _rest_delay(tables, tables.output_delay_a, state, hands_at, delay_at)
-    _start_integrals(tables, cell, state, trim, reference[REF_AIRSPEED], errors)
+    _start_integrals(tables, cell, state, trim, own[REF_AIRSPEED], errors)
 
 
 @njit(cache=True, error_model="numpy")

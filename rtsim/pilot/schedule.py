@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from rtsim.lpv.database import Database, PilotArrays
+from rtsim.lpv.database import JACOBIAN_BITS, Database, PilotArrays, round_mantissa
 from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
 from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem, build_problem
@@ -118,6 +118,16 @@ def point_problem(plant: DesignPlant, settings: PilotSettings, *, integrators: b
     )
 
 
+def _design_point(problem: MocmProblem, neighbour: MocmDesign | None) -> MocmDesign:
+    """Design from the neighbour, or from nothing where that start leads astray."""
+    if neighbour is not None:
+        try:
+            return design_problem(problem, start=neighbour)
+        except MocmError:
+            pass
+    return design_problem(problem)
+
+
 def _design_row(
     database: Database, layout: PlantLayout, settings: PilotSettings, nacelle: int
 ) -> list[tuple[int, int, DesignPlant, MocmDesign | None]]:
@@ -130,7 +140,7 @@ def _design_row(
         design: MocmDesign | None
         try:
             problem = point_problem(plant, settings, integrators=layout.integrators)
-            design = design_problem(problem, start=neighbour)
+            design = _design_point(problem, neighbour)
         except MocmError:
             design = None  # the cell is marked and filled; the map in docs/pilot.md shows it
         neighbour = design if design is not None else neighbour
@@ -190,6 +200,8 @@ def design_schedule(
         if progress is not None:
             progress(1.0 / shape[1])
     _fill(arrays, valid, database)
+    # six significant digits, as the database's derivatives: what is flown from memory and from the file is the same
+    arrays = {name: round_mantissa(value, JACOBIAN_BITS) for name, value in arrays.items()}
     return ScheduledPilot(
         outer_loop=outer_loop,
         states=layout.states,
@@ -230,9 +242,7 @@ def _fill(arrays: dict[str, Any], valid: FloatArray, database: Database) -> None
                 array[v, nacelle] = array[source, nacelle]
 
 
-def _attributes(
-    settings: PilotSettings, layout: PlantLayout, outer_loop: OuterLoop
-) -> dict[str, str | float | int]:
+def _attributes(settings: PilotSettings, layout: PlantLayout, outer_loop: OuterLoop) -> dict[str, str | float | int]:
     flat: dict[str, str | float | int] = {
         "outer_loop": outer_loop,
         "states": " ".join(layout.states),

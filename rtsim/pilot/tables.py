@@ -202,5 +202,7 @@ def _difference(database: Database, values: FloatArray, layer: int) -> FloatArra
             difference[:, nacelle] = 0.0
             continue
         for v in np.flatnonzero(~both[:, nacelle]):
-            difference[v, nacelle] = difference[good[np.argmin(np.abs(database.airspeed[good] - database.airspeed[v]))], nacelle]
+            difference[v, nacelle] = difference[
+                good[np.argmin(np.abs(database.airspeed[good] - database.airspeed[v]))], nacelle
+            ]
     return difference
