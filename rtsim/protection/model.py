@@ -1,0 +1,151 @@
+"""The laws' model of the aircraft, reduced from the LPV database: rigid body, settled rotor, mast torque, flapping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtsim.frame import FloatArray
+from rtsim.lpv.database import Database
+from rtsim.lpv.variables import required_position
+from rtsim.nacelle import load_nacelle_tables
+from rtsim.protection import prediction_kernels as kernels
+from rtsim.protection.prediction_kernels import ModelTables
+from rtsim.units import GRAVITY, deg
+
+_RIGID = ("u", "w", "q", "pitch")
+_CONTROLS = ("stick", "lever")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegulatorWeights:
+    """Just acceptable deviations and control uses of the recovery's regulator. SI and radians."""
+
+    airspeed: float
+    """Airspeed [m/s]."""
+    climb_rate: float
+    """Climb rate [m/s]."""
+    pitch: float
+    """Pitch [rad]."""
+    pitch_rate: float
+    """Pitch rate [rad/s]."""
+    stick: float
+    """Stick [-]."""
+    lever: float
+    """Lever [-]."""
+
+
+DEFAULT_WEIGHTS = RegulatorWeights(
+    airspeed=3.0, climb_rate=2.0, pitch=deg(8.0), pitch_rate=deg(10.0), stick=0.35, lever=0.25
+)
+
+
+def reduce_model(database: Database, weights: RegulatorWeights = DEFAULT_WEIGHTS) -> ModelTables:
+    """Reduce the level layer of a database to what the laws need.
+
+    Rotor and actuator states settle within 0.2 s and are replaced by their settled values.
+
+    Args:
+        database: Trims and linear models.
+        weights: Weights of the recovery's regulator.
+
+    Returns:
+        The kernels' tables.
+    """
+    level = database.level_layer
+    slow = [required_position(database.states, name, "protection") for name in _RIGID]
+    altitude = required_position(database.states, "altitude", "protection")
+    fast = [k for k in range(len(database.states)) if k not in slow and k != altitude]
+    inputs = [required_position(database.inputs, name, "protection") for name in (*_CONTROLS, "nacelle_rate")]
+    A, B, C, D = (getattr(database, name)[level] for name in "ABCD")
+    # The settled fast states are F_z (z - z_ref) + F_u (u - u_ref).
+    settle = -np.linalg.inv(A[..., fast, :][..., fast])
+    of_state = settle @ A[..., fast, :][..., slow]
+    of_input = settle @ B[..., fast, :][..., inputs]
+    of_nacelle = settle @ database.df_dnacelle[level][..., fast, None]
+    coupling = A[..., slow, :][..., fast]
+    a = A[..., slow, :][..., slow] + coupling @ of_state
+    b = B[..., slow, :][..., inputs] + coupling @ of_input
+    n = database.df_dnacelle[level][..., slow] + (coupling @ of_nacelle)[..., 0]
+
+    z = database.x_ref[level][..., slow]
+    cells = np.zeros((*z.shape[:2], kernels.CELL_SIZE))
+    cells[..., kernels.C_STATE : kernels.C_STATE + 4] = z
+    cells[..., kernels.C_CONTROL : kernels.C_CONTROL + 2] = database.u_ref[level][..., inputs[:2]]
+    u, w, q, pitch = (z[..., k] for k in range(4))
+    air = a[..., :3, :3].copy()
+    # Coriolis terms leave the aerodynamics; gravity goes with the pitch column, which is left out.
+    air[..., 0, 1] -= -q
+    air[..., 0, 2] -= -w
+    air[..., 1, 0] -= q
+    air[..., 1, 2] -= u
+    cells[..., kernels.C_AIR] = GRAVITY * np.sin(pitch) + q * w
+    cells[..., kernels.C_AIR + 1] = -GRAVITY * np.cos(pitch) - q * u
+    cells[..., kernels.C_A : kernels.C_A + 9] = air.reshape(*z.shape[:2], 9)
+    cells[..., kernels.C_B : kernels.C_B + 9] = b[..., :3, :].reshape(*z.shape[:2], 9)
+    cells[..., kernels.C_NACELLE : kernels.C_NACELLE + 3] = n[..., :3]
+
+    torque = required_position(database.outputs, "torque", "protection")
+    row = C[..., torque, :]
+    rows = {
+        kernels.C_TORQUE: (
+            database.y_ref[level][..., torque],
+            row[..., slow] + np.einsum("...f,...fz->...z", row[..., fast], of_state),
+            D[..., torque, :][..., inputs] + np.einsum("...f,...fu->...u", row[..., fast], of_input),
+        )
+    }
+    for place, name in ((kernels.C_FLAP_C, "flap_1c"), (kernels.C_FLAP_S, "flap_1s")):
+        state = required_position(database.states, name, "protection")
+        k = fast.index(state)
+        rows[place] = (database.x_ref[level][..., state], of_state[..., k, :], of_input[..., k, :])
+    for place, (value, with_state, with_input) in rows.items():
+        cells[..., place] = value
+        cells[..., place + 1 : place + 4] = with_state[..., :3]
+        cells[..., place + 4 : place + 7] = with_input
+    gain = regulator_gains(a, b[..., :2], z, weights)
+    cells[..., kernels.C_GAIN : kernels.C_GAIN + 8] = gain.reshape(*z.shape[:2], 8)
+    nacelle = load_nacelle_tables()
+    cells.setflags(write=False)
+    return ModelTables(
+        airspeed=database.airspeed,
+        nacelle=database.nacelle,
+        cells=cells,
+        nacelle_frequency=nacelle.frequency,
+        forward_stop=nacelle.forward_stop,
+        aft_stop=nacelle.aft_stop,
+    )
+
+
+def regulator_gains(a: FloatArray, b: FloatArray, z: FloatArray, weights: RegulatorWeights) -> FloatArray:
+    """Linear-quadratic regulators of all grid points at once, from the stable half of the Hamiltonians' eigenvectors.
+
+    Args:
+        a: Dynamics of u, w, q, pitch [..., 4, 4].
+        b: Stick and lever [..., 4, 2].
+        z: Trim states [..., 4].
+        weights: Weights.
+
+    Returns:
+        Gains [..., 2, 4]: controls = -gain (z - trim).
+    """
+    u, w, pitch = z[..., 0], z[..., 1], z[..., 3]
+    sine, cosine = np.sin(pitch), np.cos(pitch)
+    seen = np.zeros((*z.shape[:-1], 4, 4))
+    seen[..., 0, 0], seen[..., 0, 1], seen[..., 0, 3] = cosine, sine, w * cosine - u * sine
+    seen[..., 1, 0], seen[..., 1, 1], seen[..., 1, 3] = sine, -cosine, u * cosine + w * sine
+    seen[..., 2, 3] = 1.0
+    seen[..., 3, 2] = 1.0
+    scale = 1.0 / np.array([weights.airspeed, weights.climb_rate, weights.pitch, weights.pitch_rate]) ** 2
+    transposed = np.swapaxes
+    cost = transposed(seen, -1, -2) @ (scale[:, None] * seen)
+    effort = np.array([weights.stick, weights.lever]) ** 2
+    quadratic = (b * effort) @ transposed(b, -1, -2)
+    upper = np.concatenate([a, -quadratic], axis=-1)
+    lower = np.concatenate([-cost, -transposed(a, -1, -2)], axis=-1)
+    values, vectors = np.linalg.eig(np.concatenate([upper, lower], axis=-2))
+    order = np.argsort(values.real, axis=-1)[..., :4]
+    stable = np.take_along_axis(vectors, order[..., None, :], axis=-1)
+    riccati = (stable[..., 4:, :] @ np.linalg.inv(stable[..., :4, :])).real
+    gain: FloatArray = effort[:, None] * (transposed(b, -1, -2) @ riccati)
+    return gain

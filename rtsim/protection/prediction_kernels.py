@@ -1,0 +1,250 @@
+"""Compiled prediction: where airspeed and nacelle angle go if the controls stay as they are.
+
+The model is the rigid body (u, w, q, pitch) with the rotor and the actuators settled, linear aerodynamics about the trim
+of the present airspeed and nacelle angle, and exact gravity and Coriolis terms; the nacelles follow their filter exactly.
+What the model's acceleration misses now is carried along and dies away.
+
+Legend: z = (u, w, q, pitch); c = (stick, lever); V horizontal airspeed; n nacelle angle; r nacelle command rate.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from rtsim.corridor.corridor_kernels import CorridorTables, boundary_speed
+from rtsim.frame import FloatArray
+from rtsim.ramp_filter_kernels import critically_damped_ramp
+from rtsim.units import GRAVITY
+
+# Places in one cell of ModelTables.cells.
+C_STATE = 0
+"""Trim state u, w, q, pitch."""
+C_CONTROL = 4
+"""Trim stick, lever."""
+C_AIR = 6
+"""Aerodynamic accelerations at the trim: u', w', q'."""
+C_A = 9
+"""Their derivatives with u, w, q; rows u', w', q' (3 x 3). Specific force does not depend on attitude."""
+C_B = 18
+"""Their derivatives with stick, lever, nacelle rate (3 x 3)."""
+C_NACELLE = 27
+"""Their derivatives with the nacelle angle (3)."""
+C_TORQUE = 30
+"""Mast torque at the trim, its derivatives with u, w, q, stick, lever, nacelle rate (7)."""
+C_FLAP_C = 37
+"""The same of the cosine flapping (7)."""
+C_FLAP_S = 44
+"""The same of the sine flapping (7)."""
+C_GAIN = 51
+"""Regulator of the recovery: stick and lever per deviation of u, w, q, pitch (2 x 4)."""
+CELL_SIZE = 59
+
+OUT_LOW, OUT_HIGH, OUT_LOW_END, OUT_HIGH_END, OUT_TIME, OUT_SIDE = 0, 1, 2, 3, 4, 5
+"""Places in the result of ``roll_out``: least margins to the low and the high side, both at the end [m/s], time of the
+first crossing [s] (the horizon where there is none), its side (-1 low, 1 high, 0 none)."""
+ROLL_OUT_SIZE = 6
+
+
+class ModelTables(NamedTuple):
+    """Reduced models over the grid; read-only."""
+
+    airspeed: FloatArray
+    """Airspeed axis (V,) [m/s], ascending."""
+    nacelle: FloatArray
+    """Nacelle axis (N,) [rad], ascending."""
+    cells: FloatArray
+    """Models (V, N, CELL_SIZE), see ``C_*``."""
+    nacelle_frequency: float
+    """Natural frequency of the nacelles' critically damped filter [rad/s]."""
+    forward_stop: float
+    """Smallest nacelle command angle [rad]."""
+    aft_stop: float
+    """Largest nacelle command angle [rad]."""
+
+
+@njit(cache=True, error_model="numpy")
+def _cell_below(axis: FloatArray, value: float) -> int:
+    low = 0
+    high = axis.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if axis[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, error_model="numpy")
+def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArray) -> None:
+    """Interpolate the model, bilinear; outside the grid the nearest point holds.
+
+    Args:
+        tables: The models.
+        airspeed: Horizontal airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+        out: Written: one cell, shape (CELL_SIZE,).
+    """
+    i = _cell_below(tables.airspeed, airspeed)
+    j = _cell_below(tables.nacelle, nacelle)
+    s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
+    t = (nacelle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
+    s = min(1.0, max(0.0, s))
+    t = min(1.0, max(0.0, t))
+    w00 = (1.0 - s) * (1.0 - t)
+    w01 = (1.0 - s) * t
+    w10 = s * (1.0 - t)
+    w11 = s * t
+    c00 = tables.cells[i, j]
+    c01 = tables.cells[i, j + 1]
+    c10 = tables.cells[i + 1, j]
+    c11 = tables.cells[i + 1, j + 1]
+    for k in range(CELL_SIZE):
+        out[k] = w00 * c00[k] + w01 * c01[k] + w10 * c10[k] + w11 * c11[k]
+
+
+@njit(cache=True, error_model="numpy")
+def affine(
+    cell: FloatArray, place: int, z: tuple[float, float, float, float], controls: tuple[float, float], rate: float
+) -> float:
+    """Settled value of an output: its trim value plus derivatives times deviations.
+
+    Args:
+        cell: The model.
+        place: ``C_TORQUE``, ``C_FLAP_C`` or ``C_FLAP_S``.
+        z: u, w [m/s], q [rad/s], pitch [rad].
+        controls: Stick and lever.
+        rate: Nacelle rate [rad/s].
+    """
+    return (
+        cell[place]
+        + cell[place + 1] * (z[0] - cell[C_STATE])
+        + cell[place + 2] * (z[1] - cell[C_STATE + 1])
+        + cell[place + 3] * (z[2] - cell[C_STATE + 2])
+        + cell[place + 4] * (controls[0] - cell[C_CONTROL])
+        + cell[place + 5] * (controls[1] - cell[C_CONTROL + 1])
+        + cell[place + 6] * rate
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def accelerations(
+    cell: FloatArray,
+    z: tuple[float, float, float, float],
+    controls: tuple[float, float],
+    nacelle: tuple[float, float],
+) -> tuple[float, float, float, float, float]:
+    """Rates of u, w, q and of the horizontal airspeed, and the airspeed itself.
+
+    Args:
+        cell: The model.
+        z: u, w [m/s], q [rad/s], pitch [rad].
+        controls: Stick and lever.
+        nacelle: Nacelle angle minus that of the model [rad], nacelle rate [rad/s].
+    """
+    u, w, q, pitch = z
+    du, dw, dq = u - cell[C_STATE], w - cell[C_STATE + 1], q - cell[C_STATE + 2]
+    ds, dl = controls[0] - cell[C_CONTROL], controls[1] - cell[C_CONTROL + 1]
+    dn, rate = nacelle
+    a = (
+        cell[C_AIR] + cell[C_A] * du + cell[C_A + 1] * dw + cell[C_A + 2] * dq
+        + cell[C_B] * ds + cell[C_B + 1] * dl + cell[C_B + 2] * rate + cell[C_NACELLE] * dn
+    )  # fmt: skip
+    b = (
+        cell[C_AIR + 1] + cell[C_A + 3] * du + cell[C_A + 4] * dw + cell[C_A + 5] * dq
+        + cell[C_B + 3] * ds + cell[C_B + 4] * dl + cell[C_B + 5] * rate + cell[C_NACELLE + 1] * dn
+    )  # fmt: skip
+    m = (
+        cell[C_AIR + 2] + cell[C_A + 6] * du + cell[C_A + 7] * dw + cell[C_A + 8] * dq
+        + cell[C_B + 6] * ds + cell[C_B + 7] * dl + cell[C_B + 8] * rate + cell[C_NACELLE + 2] * dn
+    )  # fmt: skip
+    sine, cosine = math.sin(pitch), math.cos(pitch)
+    # The Coriolis terms turn the velocity with the body and leave the horizontal airspeed alone.
+    airspeed_rate = a * cosine + b * sine
+    return (
+        a - GRAVITY * sine - q * w,
+        b + GRAVITY * cosine + q * u,
+        m,
+        airspeed_rate,
+        u * cosine + w * sine,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def roll_out(
+    tables: ModelTables,
+    corridor: CorridorTables,
+    cell: FloatArray,
+    start: tuple[float, float, float, float],
+    controls: tuple[float, float],
+    nacelle: tuple[float, float, float],
+    motion: tuple[float, float],
+    bias: tuple[float, float],
+    time: tuple[float, float],
+    out: FloatArray,
+) -> None:
+    """Fly the model ahead with controls held, and find how near the corridor's boundaries it comes.
+
+    Args:
+        tables: Axes and nacelle filter.
+        corridor: The boundaries.
+        cell: The model at the present condition.
+        start: u, w [m/s], q [rad/s], pitch [rad] now.
+        controls: Stick and lever, held.
+        nacelle: Command angle [rad], angle [rad], rate [rad/s] now.
+        motion: Nacelle command rate [rad/s], and how long it is applied before the nacelles are stopped [s].
+        bias: Acceleration the model misses now [m/s^2] and the time constant with which it dies away [s].
+        time: Step and horizon [s].
+        out: Written: ``OUT_*``.
+    """
+    u, w, q, pitch = start
+    command, angle, rate = nacelle
+    wanted, hold = motion
+    missing, decay = bias
+    step, horizon = time
+    here = angle
+    frequency = tables.nacelle_frequency
+    count = int(horizon / step + 0.5)
+    fade = math.exp(-step / decay)
+    carried = 0.0  # airspeed gained from what the model misses
+    out[OUT_TIME] = horizon
+    out[OUT_SIDE] = 0.0
+    before = 0.0
+    for k in range(count + 1):
+        r = wanted if k * step < hold - 1e-9 else 0.0
+        a, b, m, _, airspeed = accelerations(cell, (u, w, q, pitch), controls, (angle - here, rate))
+        airspeed += carried
+        low = airspeed - boundary_speed(corridor.low_nacelle, corridor.low_speed, angle)
+        high = corridor.downstop_speed
+        if angle > corridor.downstop_nacelle:
+            high = boundary_speed(corridor.high_nacelle, corridor.high_speed, angle)
+        high -= airspeed
+        margin = min(low, high)
+        if k == 0:
+            out[OUT_LOW], out[OUT_HIGH] = low, high
+        else:
+            out[OUT_LOW] = min(out[OUT_LOW], low)
+            out[OUT_HIGH] = min(out[OUT_HIGH], high)
+        if out[OUT_SIDE] == 0.0 and margin < 0.0:
+            share = before / (before - margin) if k > 0 and before > margin else 0.0
+            out[OUT_TIME] = max(0.0, (k - 1 + share) * step) if k > 0 else 0.0
+            out[OUT_SIDE] = -1.0 if low < high else 1.0
+        before = margin
+        out[OUT_LOW_END], out[OUT_HIGH_END] = low, high
+        # Semi-implicit: the fast pitch motion first, so that a step of a tenth of a second stays stable.
+        q += step * m
+        pitch += step * q
+        u += step * a
+        w += step * b
+        carried += step * missing
+        missing *= fade
+        travel = r
+        if command + r * step < tables.forward_stop:
+            travel = (tables.forward_stop - command) / step
+        elif command + r * step > tables.aft_stop:
+            travel = (tables.aft_stop - command) / step
+        angle, rate, _ = critically_damped_ramp(frequency, command, travel, angle, rate, step)
+        command += travel * step

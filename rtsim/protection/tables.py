@@ -1,0 +1,55 @@
+"""Built-in laws by name, and the tables of their kernels."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+from rtsim.errors import InputError
+from rtsim.lpv.database import Database
+from rtsim.protection.boundary import BoundaryName, guarded_corridor, load_boundary
+from rtsim.protection.law_kernels import LawSettings, ProtectionTables
+from rtsim.protection.limits import frames_per_decision, load_limits, load_settings, load_weights
+from rtsim.protection.model import reduce_model
+
+LawName = Literal["off", "monitor", "governor", "full"]
+LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
+"""The built-in laws; the number of a law in compiled code is its place here."""
+
+
+def law_tables(
+    law: str,
+    database: Database,
+    *,
+    dt: float,
+    boundary: BoundaryName = "flight",
+    settings: LawSettings | None = None,
+) -> ProtectionTables:
+    """Prepare a built-in law for the kernels.
+
+    Args:
+        law: ``off``, ``monitor``, ``governor`` or ``full``.
+        database: The aircraft the law knows.
+        dt: Length of a frame [s].
+        boundary: The corridor it keeps to; its low side is tightened to what the plant can trim.
+        settings: The law's numbers; None: those of ``data/protection.toml``.
+
+    Raises:
+        InputError: There is no such law or boundary.
+    """
+    if law not in LAW_NAMES:
+        raise InputError("no such built-in law", key="protection", value=law, allowed=", ".join(LAW_NAMES))
+    limits = load_limits()
+    corridor = load_boundary(boundary, database)
+    if law in {"governor", "full"}:
+        corridor = guarded_corridor(corridor, database, limits.plant_guard)
+    return ProtectionTables(
+        law=LAW_NAMES.index(law),
+        every=frames_per_decision(dt),
+        model=reduce_model(database, load_weights()),
+        corridor=corridor.tables(),
+        torque=limits.torque,
+        settings=load_settings(dt=dt) if settings is None else settings,
+    )
+
+
+__all__ = ["LAW_NAMES", "LawName", "law_tables"]
