@@ -205,7 +205,7 @@ def set_turbulence(state: FloatArray, turbulence: Turbulence, normals: FloatArra
         if turbulence.wind_at_20_ft == 0.0:
             return
         state[dryden.T_U], state[dryden.T_W_1], state[dryden.T_W_2] = normals
-        state[dryden.T_ACTIVE] = 1.0
+        state[dryden.T_ACTIVE] = state[kernels.G_BUSY] = 1.0
     target = turbulence.wind_at_20_ft
     state[dryden.T_WIND_TARGET] = target
     if turbulence.fade_in > 0.0:
@@ -247,6 +247,7 @@ def _fill_slot(state: FloatArray, slot: int, gust: Gust) -> None:
     state[slot + kernels.SLOT_BY_LENGTH] = 0.0 if gust.length is None else 1.0
     state[slot + kernels.SLOT_BODY] = 1.0 if gust.axes == "body" else 0.0
     state[slot + kernels.SLOT_TRAVELLED] = 0.0
+    state[kernels.G_BUSY] = 1.0
 
 
 def _within(key: str, value: float, low: float, high: float, unit: str) -> None:

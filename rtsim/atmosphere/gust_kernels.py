@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numba
 
-from rtsim.atmosphere.dryden_kernels import T_SIZE, TurbulenceTables, turbulence_step
+from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
 from rtsim.frame import FloatArray
 
 # The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
@@ -25,7 +25,9 @@ G_AHEAD = T_SIZE + 3
 """Horizontal gust of the present frame, from ahead positive: what an airspeed indicator sees of it [m/s]."""
 G_BELOW = T_SIZE + 4
 """Vertical gust of the present frame, from below positive [m/s]."""
-SLOTS = T_SIZE + 5
+G_BUSY = T_SIZE + 5
+"""1 while there has been turbulence or a gust is acting or to come; 0: a frame may leave ``gust_step`` out."""
+SLOTS = T_SIZE + 6
 """Start of the discrete gusts."""
 
 # Places in a slot.
@@ -111,11 +113,15 @@ def gust_step(
     ahead, below, rate = turbulence_step(tables.turbulence, state, airspeed, altitude, dt, normals)
     along_x = 0.0
     along_z = 0.0
+    busy = state[T_ACTIVE]
     through = max(abs(airspeed), tables.turbulence.minimum_speed)
     for slot in range(SLOTS, state.shape[0], SLOT_SIZE):
         shape = state[slot + SLOT_SHAPE]
         since = time - state[slot + SLOT_START]
-        if shape == SHAPE_NONE or since < 0.0:
+        if shape == SHAPE_NONE:
+            continue
+        busy = 1.0
+        if since < 0.0:
             continue
         if state[slot + SLOT_BY_LENGTH] != 0.0:
             # A gust that begins within a frame is entered for the rest of that frame only.
@@ -132,6 +138,12 @@ def gust_step(
         else:
             ahead += share * state[slot + SLOT_FIRST]
             below += share * state[slot + SLOT_SECOND]
+    state[G_BUSY] = busy
+    if ahead == 0.0 and below == 0.0 and along_x == 0.0 and along_z == 0.0 and rate == 0.0:
+        for place in range(G_U, G_BUSY):
+            state[place] = 0.0
+        out[0] = out[1] = out[2] = 0.0
+        return
     sine = math.sin(pitch)
     cosine = math.cos(pitch)
     # + 0.0 turns a negative zero into zero: a gust of nothing is the same number as no gust.

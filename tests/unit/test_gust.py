@@ -124,6 +124,23 @@ def test_no_gust_is_exactly_no_gust(air):
     assert history.tobytes() == np.zeros_like(history).tobytes()  # not even a negative zero
 
 
+def test_busy_says_when_a_frame_may_leave_the_gusts_out():
+    air = AirSpecification(gusts=(Gust(start=0.5, ahead=1.0, duration=0.5),))
+    assert new_gust_state(AirSpecification())[kernels.G_BUSY] == 0.0
+    tables, state, out = air.tables(), new_gust_state(air), np.empty(3)
+    busy = [state[kernels.G_BUSY]]
+    for time in (0.0, 0.6, 1.1, 1.2):
+        kernels.gust_step(tables, state, 50.0, 100.0, 0.0, time, DT, NO_NORMALS, out)
+        busy.append(state[kernels.G_BUSY])
+    assert busy == [1.0, 1.0, 1.0, 1.0, 0.0]
+    assert (out == 0.0).all()
+    add_gust(state, Gust(start=0.0, ahead=1.0, duration=0.1))
+    assert state[kernels.G_BUSY] == 1.0
+    calm = new_gust_state(AirSpecification())
+    set_turbulence(calm, Turbulence.of_severity("light"), np.zeros(3))
+    assert calm[kernels.G_BUSY] == 1.0
+
+
 def test_gusts_add_up():
     one, two = Gust(start=0.1, ahead=3.0, duration=1.0), Gust(start=0.4, ahead=-1.0, below=2.0, length=40.0)
     together, _ = fly(AirSpecification(gusts=(one, two)), seconds=2.0, pitch=0.1)
