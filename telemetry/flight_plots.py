@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_Picture = tuple[str, "Callable[[FlightLog, Figure], None]", tuple[float, float]]
+
 FORMATS = ("svg", "png")
 """Every picture is written in each of these."""
 
@@ -80,7 +82,15 @@ def plot_flight(log: FlightLog, directory: str | os.PathLike[str]) -> list[Path]
         out.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
         raise OutputError(f"{out}: cannot be made ({failure.strerror}); choose another directory.") from failure
-    pictures: list[tuple[str, Callable[[FlightLog, Figure], None], tuple[float, float]]] = [
+    files: list[Path] = []
+    for name, draw, size in _pictures(log):
+        files += _write(log, out / name, draw=draw, size=size)
+    return files
+
+
+def _pictures(log: FlightLog) -> list[_Picture]:
+    """Name, drawing function and size [in] of every picture that this flight gives."""
+    pictures: list[_Picture] = [
         ("corridor", _draw_corridor, (7.5, 6.5)),
         ("flight", lambda flight, figure: _draw_panels(flight, figure, _FLIGHT), (9.0, 9.0)),
         ("controls", lambda flight, figure: _draw_panels(flight, figure, _CONTROLS), (9.0, 9.0)),
@@ -90,10 +100,7 @@ def plot_flight(log: FlightLog, directory: str | os.PathLike[str]) -> list[Path]
     ]
     if np.isfinite(log["lateness_us"]).any():
         pictures.append(("timing", _draw_timing, (9.0, 7.0)))
-    files: list[Path] = []
-    for name, draw, size in pictures:
-        files += _write(log, out / name, draw=draw, size=size)
-    return files
+    return pictures
 
 
 def _write(

@@ -32,7 +32,7 @@ def log(tmp_path: Path) -> FlightLog:
 
 
 def test_an_unknown_signal_is_answered_with_the_known_ones(log: FlightLog) -> None:
-    with pytest.raises(InputError, match="no such signal.*airspeed_kt"):
+    with pytest.raises(InputError, match=r"no such signal.*airspeed_kt"):
         log["airspeed"]
 
 

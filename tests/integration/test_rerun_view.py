@@ -1,0 +1,319 @@
+"""The Rerun view as a flight sees it: what is recorded, and that no failure of the view reaches the flight."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pyarrow as pa
+import pytest
+import rerun as rr
+
+from rtsim.errors import EXIT_OUTPUT_FAILED, OutputError
+from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry.child_process import child_environment
+from telemetry.corridor_outline import CorridorOutline
+from telemetry.rerun_view import RerunView
+from telemetry.ring import TIMING_COUNT
+from telemetry.view_options import ViewOptions, display_available, partial_name
+
+OUTLINE = CorridorOutline.from_lines(
+    "design",
+    low=([95.0, 80.0, 59.3, 0.0], [-35.0, -25.0, 58.0, 101.0]),
+    high=([95.0, 45.0, 0.0], [120.0, 170.0, 170.0]),
+    centre=([90.0, 0.0], [60.0, 135.0]),
+)
+TIMING = np.zeros(TIMING_COUNT)
+SLEEPER = (sys.executable, "-c", "import time; time.sleep(600)")
+
+
+def rows_of_a_conversion(seconds: float) -> np.ndarray:
+    frames = round(seconds * 250)
+    rows = np.zeros((frames, SIGNAL_COUNT))
+    time_s = np.arange(frames) / 250.0
+    share = time_s / seconds
+    rows[:, COLUMN.frame], rows[:, COLUMN.time_s] = np.arange(frames), time_s
+    rows[:, COLUMN.airspeed_kt] = 170.0 * share
+    rows[:, COLUMN.nacelle_deg] = 90.0 * (1.0 - share)
+    rows[:, COLUMN.on_downstop] = rows[:, COLUMN.nacelle_deg] <= 0.5
+    rows[:, COLUMN.altitude_m] = 100.0
+    rows[:, COLUMN.pitch_deg] = 5.0 * np.sin(time_s)
+    rows[:, COLUMN.longitudinal_flapping_deg] = 4.0
+    rows[:, COLUMN.distance_m] = 40.0 * time_s
+    rows[:, COLUMN.margin_low_kt] = rows[:, COLUMN.margin_kt] = np.where(share > 0.5, 3.0, 30.0)
+    rows[:, COLUMN.margin_high_kt] = 60.0
+    rows[:, COLUMN.corridor_level] = np.where(share > 0.5, 2.0, 0.0)
+    return rows
+
+
+def fly(view: RerunView, rows: np.ndarray, *, warp: float = 1.0) -> float:
+    """Push rows at their pace; give the longest time that one push took."""
+    start, slowest = time.perf_counter(), 0.0
+    for row in rows:
+        before = time.perf_counter()
+        view.push(row, TIMING)
+        slowest = max(slowest, time.perf_counter() - before)
+        time.sleep(max(0.0, start + (row[COLUMN.time_s] - rows[0, COLUMN.time_s]) / warp - time.perf_counter()))
+    return slowest
+
+
+def chunks(path: Path, entity: str) -> list[pa.RecordBatch]:
+    found = rr.chunk.RrdReader(str(path)).stream().filter(content=entity)
+    return [chunk.to_record_batch() for chunk in found]
+
+
+def values(path: Path, entity: str, component: str) -> list[Any]:
+    """All values of a component, in the order of time."""
+    pairs: list[tuple[int, Any]] = []
+    for batch in chunks(path, entity):
+        if component in batch.schema.names and "sim_time" in batch.schema.names:
+            times = batch.column("sim_time").cast(pa.int64()).to_pylist()
+            pairs += zip(times, batch.column(component).to_pylist(), strict=True)
+    return [value for _, value in sorted(pairs, key=lambda pair: pair[0])]
+
+
+@pytest.fixture
+def told() -> list[str]:
+    return []
+
+
+@contextlib.contextmanager
+def viewing(options: ViewOptions, told: list[str]) -> Iterator[RerunView]:
+    view = RerunView(options, corridor=OUTLINE, title="test", on_message=told.append)
+    try:
+        yield view
+    finally:
+        with contextlib.suppress(OutputError):
+            view.close()
+
+
+def test_a_recording_holds_the_flight(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    rows = rows_of_a_conversion(3.0)
+    with viewing(ViewOptions(viewer=False, record=record), told) as view:
+        assert view.wait_ready(30.0)
+        view.event("flight begins", "info")
+        fly(view, rows)
+        start = time.monotonic()
+        view.close()
+        assert time.monotonic() - start < 3.0
+    assert told == []
+    assert view.failure is None
+    assert view.dropped == 0
+    assert not partial_name(record).exists()
+    speeds = [row[0] for row in values(record, "/plots/speed/kn", "Scalars:scalars")]
+    assert speeds == rows[::5, COLUMN.airspeed_kt].tolist(), "50 points of a curve per second, exact"
+    text = [entry[0] for entry in values(record, "/events/log", "TextLog:text")]
+    assert "flight begins" in text
+    assert "Corridor warning: +3.0 kn to the low-speed side" in text
+    modes = [entry[0] for entry in values(record, "/events/mode", "StateChange:state")]
+    assert modes == ["HELICOPTER", "CONVERSION", "AIRPLANE"]
+    nacelle = values(record, "/world/aircraft/nacelle_left", "Transform3D:quaternion")
+    assert nacelle[0][0] == pytest.approx([0.0, np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)], abs=1e-6)
+    assert nacelle[-1][0][3] == pytest.approx(1.0, abs=1e-3), "airplane mode at the end"
+    assert len(nacelle) > 40
+    assert list(rr.chunk.RrdReader(str(record)).blueprints()), "the layout is in the file"
+
+
+def test_flapping_tilts_the_discs_forward(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    with viewing(ViewOptions(viewer=False, record=record), told) as view:
+        assert view.wait_ready(30.0)
+        fly(view, rows_of_a_conversion(0.3))
+    for side in ("left", "right"):
+        x, y, z, w = values(record, f"/world/aircraft/nacelle_{side}/hub", "Transform3D:quaternion")[-1][0]
+        assert 2.0 * np.arctan2(np.hypot(x, np.hypot(y, z)), w) == pytest.approx(np.radians(4.0), abs=1e-6)
+        mast_z = 2.0 * (x * z - w * y)  # where the disc's axis (+x of the hub) points in the nacelle's z
+        assert mast_z == pytest.approx(np.sin(np.radians(4.0)), abs=1e-6)
+
+
+def test_a_reset_begins_a_new_recording(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    rows = rows_of_a_conversion(1.0)
+    with viewing(ViewOptions(viewer=False, record=record), told) as view:
+        assert view.wait_ready(30.0)
+        fly(view, rows)
+        fly(view, rows[:125])
+    ids = []
+    for path, last in ((record, 0.98), (tmp_path / "flight-2.rrd", 0.48)):
+        ids.append({recording.recording_id for recording in rr.chunk.RrdReader(str(path)).recordings()})
+        speeds = [row[0] for row in values(path, "/plots/speed/kn", "Scalars:scalars")]
+        assert len(speeds) == round(last * 50) + 1
+        assert (np.diff(speeds) > 0.0).all(), "runs are not mixed"
+    assert not ids[0] & ids[1]
+    assert told == []
+
+
+def test_a_frozen_view_is_replaced_once_and_then_given_up(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    options = ViewOptions(viewer=False, record=record, stall_timeout_s=0.7)
+    rows = rows_of_a_conversion(3.0)
+    with viewing(options, told) as view:
+        for attempt in range(2):
+            assert view.wait_ready(30.0)
+            assert view._process is not None
+            os.kill(view._process.pid, signal.SIGSTOP)
+            slowest = fly(view, rows[attempt * 375 : attempt * 375 + 375])
+            assert slowest < 0.25, "the flight never stalls"
+        assert "did not move for 1 s; it was started again" in told[0]
+        assert "given up" in told[1]
+        assert not view.alive
+        fly(view, rows[:50], warp=10.0)  # and goes on without the view
+        assert view.dropped > 0
+        start = time.monotonic()
+        view.close()
+        assert time.monotonic() - start < 1.0
+    assert isinstance(view.failure, OutputError)
+    assert view.failure.exit_code == EXIT_OUTPUT_FAILED
+    assert "recording is incomplete" in str(view.failure)
+
+
+def test_a_view_that_is_killed_is_started_again(told: list[str], tmp_path: Path) -> None:
+    record = tmp_path / "flight.rrd"
+    with viewing(ViewOptions(viewer=False, record=record), told) as view:
+        assert view.wait_ready(30.0)
+        assert view._process is not None
+        view._process.kill()
+        fly(view, rows_of_a_conversion(0.6))
+        assert "ended unexpectedly" in told[0]
+        assert view.wait_ready(30.0)
+        fly(view, rows_of_a_conversion(0.5))
+    assert (tmp_path / "flight-again2.rrd").exists()
+
+
+def test_a_view_that_is_frozen_at_the_end_is_ended_in_time(tmp_path: Path, told: list[str]) -> None:
+    with viewing(ViewOptions(viewer=False, record=tmp_path / "flight.rrd"), told) as view:
+        assert view.wait_ready(30.0)
+        assert view._process is not None
+        os.kill(view._process.pid, signal.SIGSTOP)
+        start = time.monotonic()
+        view.close(timeout_s=1.0)
+        assert time.monotonic() - start < 2.0
+    assert "did not close within 1 s" in told[0]
+    assert view.failure is not None
+
+
+def test_a_missing_viewer_is_told_and_the_recording_goes_on(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    options = ViewOptions(viewer=True, record=record, viewer_command=("/nonexistent/viewer",))
+    with viewing(options, told) as view:
+        assert view.wait_ready(30.0)
+        fly(view, rows_of_a_conversion(1.0))
+    assert len(told) == 1
+    assert "The viewer cannot be started" in told[0]
+    assert len(values(record, "/plots/speed/kn", "Scalars:scalars")) == 50
+
+
+@pytest.mark.parametrize(("code", "words"), [(0, "was closed"), (7, "could not show its window (exit code 7)")])
+def test_a_viewer_that_ends_is_told(tmp_path: Path, told: list[str], code: int, words: str) -> None:
+    command = (sys.executable, "-c", f"import sys, time; time.sleep(0.3); sys.exit({code})")
+    with viewing(ViewOptions(viewer=True, viewer_command=command), told) as view:
+        assert view.wait_ready(30.0)
+        assert fly(view, rows_of_a_conversion(2.0)) < 0.25
+    assert len(told) == 1
+    assert words in told[0]
+
+
+@pytest.mark.parametrize("close_viewer", [False, True])
+def test_the_viewer_stays_open_unless_it_is_to_close(told: list[str], close_viewer: bool) -> None:
+    options = ViewOptions(viewer=True, viewer_command=SLEEPER, close_viewer=close_viewer)
+    with viewing(options, told) as view:
+        assert view.wait_ready(30.0)
+        viewer = psutil.Process(view._viewer_pid)
+        assert viewer.cmdline()[-1].startswith("rerun+http://127.0.0.1:")
+        fly(view, rows_of_a_conversion(0.2))
+        start = time.monotonic()
+        view.close()
+        assert time.monotonic() - start < 3.0
+    if close_viewer:
+        assert not viewer.is_running()
+    else:
+        assert viewer.is_running()
+        viewer.kill()
+        viewer.wait(5.0)
+    assert told == []
+
+
+def test_only_the_loopback_interface_listens(told: list[str]) -> None:
+    with viewing(ViewOptions(viewer=True, viewer_command=SLEEPER, close_viewer=True), told) as view:
+        assert view.wait_ready(30.0)
+        assert view._process is not None
+        listening = [
+            connection.laddr.ip
+            for connection in psutil.Process(view._process.pid).net_connections()
+            if connection.status == psutil.CONN_LISTEN
+        ]
+        assert listening == ["127.0.0.1"]
+
+
+def test_a_viewer_that_never_reads_does_not_hold_up_the_flight(told: list[str], tmp_path: Path) -> None:
+    # It connects like a viewer, then reads not a byte: what a frozen window does to the server.
+    script = (
+        "import socket, sys, time\n"
+        "port = int(sys.argv[-1].split(':')[2].split('/')[0])\n"
+        "link = socket.create_connection(('127.0.0.1', port))\n"
+        "link.sendall(b'PRI * HTTP/2.0\\r\\n\\r\\nSM\\r\\n\\r\\n')\n"
+        "time.sleep(600)\n"
+    )
+    record = tmp_path / "flight.rrd"
+    options = ViewOptions(viewer=True, record=record, viewer_command=(sys.executable, "-c", script), close_viewer=True)
+    with viewing(options, told) as view:
+        assert view.wait_ready(30.0)
+        assert fly(view, rows_of_a_conversion(2.0)) < 0.25
+        start = time.monotonic()
+        view.close()
+        assert time.monotonic() - start < 3.5
+    assert told == []
+    assert len(values(record, "/plots/speed/kn", "Scalars:scalars")) == 100
+
+
+def test_the_view_finishes_its_file_and_ends_when_the_flight_is_killed(tmp_path: Path) -> None:
+    record = tmp_path / "flight.rrd"
+    script = (
+        "import sys, time\n"
+        "from pathlib import Path\n"
+        "from telemetry.rerun_view import RerunView\n"
+        "from telemetry.view_options import ViewOptions\n"
+        "view = RerunView(ViewOptions(viewer=False, record=Path(sys.argv[1])))\n"
+        "assert view.wait_ready(30.0)\n"
+        "print(view._process.pid, flush=True)\n"
+        "time.sleep(600)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script, str(record)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env=child_environment(),
+        text=True,
+    ) as flight:
+        assert flight.stdout is not None
+        worker = psutil.Process(int(flight.stdout.readline()))
+        flight.kill()
+        flight.wait(10.0)
+    worker.wait(10.0)
+    assert record.exists()
+    assert not partial_name(record).exists()
+
+
+def test_an_unwritable_recording_is_refused_before_the_flight(tmp_path: Path) -> None:
+    for record in (tmp_path / "missing" / "flight.rrd", tmp_path):
+        with pytest.raises(OutputError, match="the recording cannot be written here"):
+            RerunView(ViewOptions(viewer=False, record=record))
+
+
+def test_a_display_is_found_by_its_variables(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert not display_available()
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert display_available()

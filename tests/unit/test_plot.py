@@ -1,0 +1,85 @@
+"""Pictures of a recorded flight: every file whole, and showing what the log holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+
+from rtsim.errors import InputError, OutputError
+from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry import flight_plots
+from telemetry.corridor_outline import CorridorOutline
+from telemetry.flight_plots import plot_flight
+from telemetry.log_format import FlightMetadata
+from telemetry.log_reader import FlightLog, read_log
+from telemetry.recorder import Recorder
+from telemetry.ring import TIMING_COUNT
+
+OUTLINE = CorridorOutline.from_lines("design", low=([90.0, 0.0], [0.0, 101.0]), high=([90.0, 0.0], [125.0, 170.0]))
+
+
+def record(path: Path, frames: int, *, timed: bool) -> FlightLog:
+    rows = np.zeros((frames, SIGNAL_COUNT))
+    rows[:, COLUMN.time_s] = np.arange(frames) / 50.0
+    rows[:, COLUMN.airspeed_kt] = np.linspace(0.0, 170.0, frames)
+    rows[:, COLUMN.nacelle_deg] = np.linspace(90.0, 0.0, frames)
+    recorder = Recorder(path, FlightMetadata("hover <& more>", "", "h", 0, 50.0, corridor=OUTLINE), live=False)
+    for row in rows:
+        recorder.push(row, np.full(TIMING_COUNT, 7.0) if timed else None)
+    recorder.close({})
+    return read_log(path)
+
+
+def test_every_picture_is_there_whole_and_in_both_formats(tmp_path: Path) -> None:
+    log = record(tmp_path / "flight.parquet", 300, timed=True)
+    out = tmp_path / "pictures" / "here"
+    files = plot_flight(log, out)
+    names = ("corridor", "flight", "controls", "flapping", "margins", "signals", "timing")
+    assert [file.name for file in files] == [f"{name}.{ending}" for name in names for ending in ("svg", "png")]
+    assert sorted(out.iterdir()) == sorted(files), "no temporary file is left"
+    for file in files:
+        if file.suffix == ".svg":
+            assert ET.parse(file).getroot().tag.endswith("svg")
+        else:
+            picture = imread(file)
+            assert picture.shape[0] > 500
+            assert picture.std() > 0.02, "an empty picture"
+
+
+def test_the_corridor_picture_shows_boundaries_and_path(tmp_path: Path) -> None:
+    log = record(tmp_path / "flight.parquet", 100, timed=False)
+    figure = Figure()
+    flight_plots._draw_corridor(log, figure)
+    lines = {str(line.get_label()): line.get_xydata() for line in figure.axes[0].get_lines()}
+    assert np.array_equal(lines["flown"][:, 0], log["airspeed_kt"])
+    assert np.array_equal(lines["flown"][:, 1], log["nacelle_deg"])
+    assert lines["low-speed boundary"].tolist() == [[0.0, 90.0], [101.0, 0.0]]
+    assert lines["high-speed boundary"].tolist() == [[125.0, 90.0], [170.0, 0.0]]
+
+
+def test_every_signal_is_in_one_of_the_plots_with_its_unit(tmp_path: Path) -> None:
+    log = record(tmp_path / "flight.parquet", 100, timed=False)
+    figure = Figure()
+    flight_plots._draw_all_signals(log, figure)
+    shown = {str(line.get_label()).replace(" ", "_") for axes in figure.axes for line in axes.get_lines()}
+    states = {"frame", "time_s", "corridor_level", "on_downstop", "control_on_stop", "pilot_mode"}
+    assert shown | states == set(log.names[:SIGNAL_COUNT])
+    assert all("[" in axes.get_title(loc="left") for axes in figure.axes if axes.get_visible())
+
+
+def test_an_unpaced_flight_has_no_timing_picture(tmp_path: Path) -> None:
+    names = [name for name, _, _ in flight_plots._pictures(record(tmp_path / "flight.parquet", 60, timed=False))]
+    assert names == ["corridor", "flight", "controls", "flapping", "margins", "signals"]
+
+
+def test_a_flight_without_frames_and_a_place_without_rights_are_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no flight to draw"):
+        plot_flight(record(tmp_path / "empty.parquet", 0, timed=False), tmp_path / "out")
+    (tmp_path / "file").write_text("no directory")
+    with pytest.raises(OutputError, match="cannot be made"):
+        plot_flight(record(tmp_path / "flight.parquet", 60, timed=False), tmp_path / "file" / "out")
