@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,6 +16,35 @@ class Command:
     """Power lever, 0 (low collective) to 1 (high collective)."""
     nacelle_rate: float
     """Commanded nacelle rate [rad/s]; negative converts towards airplane mode (0 deg)."""
+
+
+class StickInput(NamedTuple):
+    """What a person's sticks say, as received last; a NamedTuple, since the loop makes one in every frame."""
+
+    sequence: int = 0
+    """Counts the inputs taken so far; 0 before the first."""
+    received_ns: int = 0
+    """When it reached this machine, on the scale of ``time.monotonic_ns`` [ns]; 0 before the first."""
+    stick: float = 0.0
+    """Longitudinal stick, -1 aft to 1 forward, 0 centre."""
+    lever: float = 0.0
+    """Power lever, 0 to 1, absolute."""
+    lateral: float = 0.0
+    """Lateral stick, -1 left to 1 right; shown, does not act on the symmetric model."""
+    yaw: float = 0.0
+    """Pedals, -1 left to 1 right; shown, do not act on the symmetric model."""
+    stick_valid: bool = False
+    """Somebody holds the longitudinal stick (a released channel is nobody's)."""
+    lever_valid: bool = False
+    """Somebody holds the power lever."""
+    nacelle_switch: int = 0
+    """Nacelle switch: -1 forward (airplane), 0 let go or both pressed, 1 aft (helicopter)."""
+    nacelle_angle: float = float("nan")
+    """Absolute nacelle angle asked for by an axis [rad]; NaN where no axis asks."""
+    buttons: int = 0
+    """Buttons held, one bit each."""
+    owner: int = 0
+    """Who holds the sticks: 256 * MAVLink system id + component id; 0 nobody."""
 
 
 @dataclass(frozen=True, slots=True)

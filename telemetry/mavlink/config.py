@@ -1,0 +1,223 @@
+"""Settings of the MAVLink vehicle: where it sends, who may fly, how it presents itself."""
+
+from __future__ import annotations
+
+import ipaddress
+import json
+import socket
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from rtsim.errors import InputError
+
+DEFAULT_TARGET = "127.0.0.1:14550"
+"""Where ground stations listen by convention."""
+WHITELIST = tuple(range(240, 256))
+"""System ids of ground stations (QGroundControl, MAVProxy 255, MAVSDK 245, APM Planner 252); no vehicle uses them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """An IPv4 address and a UDP port."""
+
+    host: str
+    """Dotted address."""
+    port: int
+    """UDP port."""
+
+    @classmethod
+    def parse(cls, text: str, *, key: str = "--mavlink") -> Endpoint:
+        """Read ``HOST:PORT``; a name is resolved now.
+
+        Args:
+            text: What the user wrote; ``HOST`` alone means port 14550.
+            key: The option it was given to, for the message.
+
+        Raises:
+            InputError: It is not an address, or the name is unknown.
+        """
+        host, colon, port_text = text.strip().rpartition(":")
+        if not colon:
+            host, port_text = text.strip(), "14550"
+        allowed = "HOST:PORT with an IPv4 address or a name, port 1 to 65535"
+        mend = f"write for example {DEFAULT_TARGET}"
+        if not port_text.isascii() or not port_text.isdigit() or not 1 <= int(port_text) <= 65535 or not host:
+            raise InputError("is no UDP address", key=key, value=text, allowed=allowed, mend=mend)
+        try:
+            found = socket.getaddrinfo(host, int(port_text), socket.AF_INET, socket.SOCK_DGRAM)
+        except (OSError, UnicodeError):
+            raise InputError("the name cannot be resolved", key=key, value=text, allowed=allowed, mend=mend) from None
+        return cls(str(found[0][4][0]), int(port_text))
+
+    @property
+    def loopback(self) -> bool:
+        """Whether it stays on this machine."""
+        return ipaddress.ip_address(self.host).is_loopback
+
+    def __str__(self) -> str:
+        return f"{self.host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class HomePosition:
+    """Where the flight begins on the globe: the XV-15 flew at NASA's Crows Landing field."""
+
+    latitude_deg: float = 37.4080
+    """North positive [deg]."""
+    longitude_deg: float = -121.1090
+    """East positive [deg]."""
+    altitude_m: float = 0.0
+    """Ground elevation above mean sea level [m]; 0 because the model flies in sea-level air at every height."""
+    heading_deg: float = 350.0
+    """True heading, fixed: the model is symmetric and does not turn [deg]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MavlinkConfig:
+    """Everything the MAVLink process needs to know."""
+
+    targets: tuple[Endpoint, ...] = (Endpoint("127.0.0.1", 14550),)
+    """Where telemetry goes unasked."""
+    bind_host: str = "127.0.0.1"
+    """Address to receive on."""
+    bind_port: int = 0
+    """Port to receive on; 0 takes a free one."""
+    system_id: int = 1
+    """Own MAVLink system id."""
+    component_id: int = 1
+    """Own component id; ground stations make a vehicle of component 1 only."""
+    autopilot: Literal["px4", "generic"] = "px4"
+    """How ground stations decode modes; see docs/mavlink.md."""
+    whitelist: tuple[int, ...] = WHITELIST
+    """System ids that may fly and change things."""
+    rate_hz: float = 250.0
+    """Frame rate of the flight."""
+    home: HomePosition = HomePosition()
+    """Start of the flight on the globe."""
+    aids: Mapping[str, bool] = field(default_factory=dict)
+    """Pilot aids of the flight and whether each is on at the start, in the order of ``Feedback.aids``."""
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    """Start values of parameters that differ from their defaults, by name (``XV_...``)."""
+    parameter_file: str | None = None
+    """Where parameters are stored on request, and read from at the start."""
+    axes: Mapping[str, str] = field(default_factory=dict)
+    """MANUAL_CONTROL field behind each control, a leading ``-`` reverses; empty takes the standard ones."""
+    buttons: Mapping[str, int] = field(default_factory=dict)
+    """Button number of each function; empty takes the standard ones."""
+    signing_key_file: str | None = None
+    """File with the signing key; None flies unsigned."""
+    reboot_resets: bool = False
+    """Let MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN reset the flight."""
+    title: str = "flight"
+    """What is flown, for the greeting."""
+    version: str = "0.0.0"
+    """Version of rtsim."""
+
+    @property
+    def networked(self) -> bool:
+        """Whether anything of it leaves this machine."""
+        return not (
+            ipaddress.ip_address(self.bind_host).is_loopback and all(target.loopback for target in self.targets)
+        )
+
+    def to_json(self) -> str:
+        """The settings as one line of JSON."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> MavlinkConfig:
+        """Read back what ``to_json`` wrote.
+
+        Args:
+            text: The line.
+        """
+        values: dict[str, Any] = json.loads(text)
+        values["targets"] = tuple(Endpoint(**target) for target in values["targets"])
+        values["home"] = HomePosition(**values["home"])
+        values["whitelist"] = tuple(values["whitelist"])
+        return cls(**values)
+
+
+def endpoints(
+    targets: Sequence[str], *, allow_network: bool, bind: str | None = None
+) -> tuple[tuple[Endpoint, ...], str, int, str | None]:
+    """Check what the user wants to send to and receive on.
+
+    Args:
+        targets: ``HOST:PORT`` each; empty takes the default.
+        allow_network: Whether the user said that MAVLink may leave this machine.
+        bind: ``HOST:PORT`` to receive on; None takes loopback, or all addresses where a target is elsewhere.
+
+    Returns:
+        Targets, address and port to receive on, and a warning to print or None.
+
+    Raises:
+        InputError: An address is wrong, or leaves this machine without permission.
+    """
+    found = tuple(Endpoint.parse(text) for text in (targets or (DEFAULT_TARGET,)))
+    if bind is not None:
+        own = Endpoint.parse(bind, key="--mavlink-bind")
+        host, port = own.host, own.port
+    else:
+        host, port = ("127.0.0.1" if all(target.loopback for target in found) else "0.0.0.0"), 0
+    away = [str(target) for target in found if not target.loopback]
+    if not ipaddress.ip_address(host).is_loopback:
+        away.append(host)
+    if not away:
+        return found, host, port, None
+    if not allow_network:
+        raise InputError(
+            "leaves this machine, and MAVLink has no authentication",
+            key="--mavlink",
+            value=", ".join(away),
+            allowed="loopback addresses",
+            mend="add --mavlink-network if every machine that can reach it may fly the aircraft",
+        )
+    warning = (
+        f"MAVLink is open to the network ({', '.join(away)}): anyone who can send a packet there may fly the aircraft. "
+        "Use a signing key (--mavlink-key) or a network you trust."
+    )
+    return found, host, port, warning
+
+
+def read_signing_key(path: str | Path) -> bytes:
+    """Read a signing key: 64 hexadecimal digits, or 32 raw bytes.
+
+    Args:
+        path: The file; nobody but its owner may be able to read it.
+
+    Returns:
+        The key, 32 bytes.
+
+    Raises:
+        InputError: The file is missing, open to others, or holds no key.
+    """
+    file = Path(path)
+    try:
+        mode = file.stat().st_mode
+        data = file.read_bytes()[:4096]
+    except OSError as failure:
+        raise InputError(
+            f"the signing key cannot be read ({failure.strerror})", key="--mavlink-key", value=str(path)
+        ) from None
+    if mode & 0o077:
+        raise InputError(
+            "the signing key can be read by others", key="--mavlink-key", value=str(path), mend=f"run chmod 600 {path}"
+        )
+    if len(data) == 32:
+        return data
+    try:
+        key = bytes.fromhex(data.decode("ascii").strip())
+    except ValueError:
+        key = b""
+    if len(key) != 32:
+        raise InputError(
+            "the file holds no signing key",
+            key="--mavlink-key",
+            value=str(path),
+            allowed="64 hexadecimal digits or 32 bytes",
+            mend="make one with: openssl rand -hex 32",
+        )
+    return key

@@ -1,0 +1,167 @@
+"""What the vehicle knows of the flight: the newest row, the feedback of the sticks, and what follows from both."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.units import to_deg
+from telemetry.mavlink.exchange import Feedback
+from telemetry.ring import TIMING_COUNT
+
+PILOT_MOCM, PILOT_EXTERNAL, PILOT_HOLD = 0, 1, 2
+"""Values of the row's ``pilot_mode``."""
+INPUT_NONE, INPUT_LIVE, INPUT_LOST = 0, 1, 2
+"""Values of ``Feedback.input_state``."""
+VTOL_TO_AIRPLANE, VTOL_TO_HELICOPTER, VTOL_HELICOPTER, VTOL_AIRPLANE = 1, 2, 3, 4
+"""MAV_VTOL_STATE."""
+TORQUE_LIMIT_INLB = 130_000.0
+"""Mast torque of trq_pct = 100 in conversion and airplane mode [in lb]."""
+HOVER_TORQUE_LIMIT_INLB = 163_000.0
+"""The same in helicopter mode: nacelle above 80 deg and below 60 kn [in lb]."""
+ROTOR_SPEED_RPM = 589.0
+"""Rotor speed of rpm_pct = 100 [rpm]."""
+
+
+@dataclass(slots=True)
+class FlightState:
+    """The flight as last heard of."""
+
+    rate_hz: float
+    """Frames per second."""
+    row: FloatArray = field(default_factory=lambda: np.zeros(SIGNAL_COUNT))
+    """Newest frame row."""
+    timing: FloatArray = field(default_factory=lambda: np.zeros(TIMING_COUNT))
+    """Its timing columns."""
+    feedback: Feedback = field(default_factory=Feedback)
+    """Newest feedback of the sticks."""
+    started: bool = False
+    """Whether any row has come."""
+    armed: bool = False
+    """The flag ground stations set; it does not stop the rotors."""
+    boot_s: float = 0.0
+    """Simulated time since the start of this process's flight, going on over resets [s]."""
+    vtol_state: int = VTOL_HELICOPTER
+    """MAV_VTOL_STATE."""
+    worst_level: int = 0
+    """Highest corridor level of the rows since the last tick."""
+    _before_reset_s: float = 0.0
+    _arrival_s: float = 0.0
+
+    def observe(self, rows: FloatArray, now: float) -> bool:
+        """Take new rows.
+
+        Args:
+            rows: Full rows (signals, then timing), oldest first.
+            now: Monotonic time [s].
+
+        Returns:
+            Whether the flight started again in them (a reset).
+        """
+        if not len(rows):
+            return False
+        times = rows[:, COLUMN.time_s]
+        reset = False
+        for time in times.tolist():
+            if self.started and time < self.boot_s - self._before_reset_s:
+                # Clients take a clock that jumps back for a reboot, so theirs goes on.
+                self._before_reset_s = self.boot_s + 1.0 / self.rate_hz - time
+                reset = True
+            self.boot_s = self._before_reset_s + time
+            self.started = True
+        self.row, self.timing = rows[-1, :SIGNAL_COUNT], rows[-1, SIGNAL_COUNT:]
+        self.worst_level = max(self.worst_level, int(np.max(rows[:, COLUMN.corridor_level])))
+        self._arrival_s = now
+        self._update_vtol_state()
+        return reset
+
+    def value(self, name: str) -> float:
+        """A signal of the newest row; 0 where it is not finite.
+
+        Args:
+            name: Name of the signal.
+        """
+        number = float(self.row[getattr(COLUMN, name)])
+        return number if math.isfinite(number) else 0.0
+
+    def boot_ns(self, now: float) -> int:
+        """Simulated time of this moment: the newest row's, carried on for up to two frames [ns].
+
+        Args:
+            now: Monotonic time [s].
+        """
+        ahead = min(max(now - self._arrival_s, 0.0), 2.0 / self.rate_hz) if self.started else 0.0
+        return int((self.boot_s + ahead) * 1e9)
+
+    @property
+    def boot_ms(self) -> int:
+        """Time stamp of the newest row [ms]."""
+        return round(self.boot_s * 1e3) & 0xFFFFFFFF
+
+    @property
+    def boot_us(self) -> int:
+        """Time stamp of the newest row [us]."""
+        return round(self.boot_s * 1e6)
+
+    @property
+    def pilot(self) -> int:
+        """Who flies, as in the row."""
+        return int(self.value("pilot_mode"))
+
+    @property
+    def input_lost(self) -> bool:
+        """A person flies, or should, and the sticks are silent."""
+        return self.pilot == PILOT_EXTERNAL and int(self.feedback.input_state) == INPUT_LOST
+
+    @property
+    def torque_pct(self) -> float:
+        """Mast torque in per cent of its limit in this mode of flight."""
+        helicopter = self.value("nacelle_deg") > 80.0 and self.value("airspeed_kt") < 60.0
+        limit = HOVER_TORQUE_LIMIT_INLB if helicopter else TORQUE_LIMIT_INLB
+        return 100.0 * self.value("mast_torque_inlb") / limit
+
+    @property
+    def rotor_speed_pct(self) -> float:
+        """Rotor speed in per cent of the conversion speed."""
+        return 100.0 * self.value("rotor_speed_rpm") / ROTOR_SPEED_RPM
+
+    @property
+    def nacelle_command_deg(self) -> float:
+        """Angle the conversion actuator is commanded to [deg]."""
+        if self.feedback.input_state:
+            return to_deg(self.feedback.nacelle_command)
+        return self.value("nacelle_reference_deg")
+
+    @property
+    def shown_stick(self) -> float:
+        """Longitudinal stick as the hands hold it; the acting one while nobody's hands fly."""
+        return self.feedback.stick if self.pilot == PILOT_EXTERNAL else self.value("stick")
+
+    @property
+    def shown_lever(self) -> float:
+        """Power lever as the hands hold it; the acting one while nobody's hands fly."""
+        return self.feedback.lever if self.pilot == PILOT_EXTERNAL else self.value("lever")
+
+    def _update_vtol_state(self) -> None:
+        """Helicopter above 85 deg, airplane below 2 deg, else the way the nacelles move, moved last, or are sent."""
+        angle, rate = self.value("nacelle_deg"), self.value("nacelle_rate_deg_s")
+        asked = int(self.feedback.transition)
+        if asked == VTOL_AIRPLANE and angle >= 2.0:
+            self.vtol_state = VTOL_TO_AIRPLANE
+        elif asked == VTOL_HELICOPTER and angle <= 85.0:
+            self.vtol_state = VTOL_TO_HELICOPTER
+        elif angle > 85.0:
+            self.vtol_state = VTOL_HELICOPTER
+        elif angle < 2.0:
+            self.vtol_state = VTOL_AIRPLANE
+        elif rate < -0.05:
+            self.vtol_state = VTOL_TO_AIRPLANE
+        elif rate > 0.05:
+            self.vtol_state = VTOL_TO_HELICOPTER
+        elif self.vtol_state == VTOL_HELICOPTER:
+            self.vtol_state = VTOL_TO_AIRPLANE
+        elif self.vtol_state == VTOL_AIRPLANE:
+            self.vtol_state = VTOL_TO_HELICOPTER

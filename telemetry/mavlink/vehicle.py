@@ -1,0 +1,384 @@
+"""The vehicle itself, without a socket: datagrams in, datagrams out, rows and feedback beside them.
+
+The process around it (``vehicle_process``) owns the socket and the clock; tests drive this object directly.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import all as dialect
+
+from rtsim.errors import InputError
+from rtsim.frame import FloatArray
+from telemetry.mavlink import messages as ids
+from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler
+from telemetry.mavlink.config import MavlinkConfig, read_signing_key
+from telemetry.mavlink.exchange import (
+    ACCEPTED as ACCEPTED_WORD,
+)
+from telemetry.mavlink.exchange import (
+    ARMED,
+    DISCARDED,
+    PEERS,
+    RECEIVED,
+    SENT,
+    Exchange,
+    Request,
+)
+from telemetry.mavlink.framing import Frame, SignatureCheck, decode, frames
+from telemetry.mavlink.messages import MessageFactory
+from telemetry.mavlink.modes import offered_modes
+from telemetry.mavlink.notices import INFO, WARNING, NoticeBoard
+from telemetry.mavlink.parameters import (
+    AID_PARAMETERS,
+    LEVER_RANGE,
+    NACELLE_COMMAND,
+    OWNER_TIME,
+    WARNINGS,
+    ParameterStore,
+)
+from telemetry.mavlink.peers import Address, Peer, PeerTable
+from telemetry.mavlink.pilot_input import OwnerLock, PilotId, StickReader
+from telemetry.mavlink.services import Services
+from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST, FlightState
+
+LONGEST_PAUSE_S = 0.02
+"""Changes in the flight are noticed at least this often [s]."""
+_LIST_PAUSE_S = 0.004
+_GROUND_HEARTBEAT, _SET_MODE, _MANUAL_CONTROL, _OVERRIDE, _COMMAND_INT, _COMMAND_LONG = 0, 11, 69, 70, 75, 76
+
+
+class Vehicle:
+    """One XV-15 as ground stations see it."""
+
+    def __init__(
+        self, config: MavlinkConfig, exchange: Exchange, *, send: Callable[[bytes, Address], None], now: float
+    ) -> None:
+        """Put the vehicle together.
+
+        Args:
+            config: Its settings.
+            exchange: Shared memory to the flight.
+            send: Sends a datagram; must not wait and not raise.
+            now: Monotonic time [s].
+
+        Raises:
+            InputError: A setting, the signing key or the stored parameters are wrong.
+        """
+        self.config = config
+        self.now = now
+        """Time of the newest call, monotonic [s]."""
+        self.state = FlightState(config.rate_hz)
+        self.store = ParameterStore(config.aids, config.parameters)
+        self.factory = MessageFactory(config, self.state)
+        self.modes = offered_modes(config.aids)
+        self.board = NoticeBoard(now)
+        self.lock = OwnerLock(config.whitelist)
+        self.reader = StickReader(config.axes, config.buttons)
+        key = read_signing_key(config.signing_key_file) if config.signing_key_file else None
+        self._signatures = SignatureCheck(key) if key else None
+        targets = tuple((target.host, target.port) for target in config.targets)
+        self.peers = PeerTable(
+            targets, own=(config.system_id, config.component_id), fastest_hz=config.rate_hz, key=key, now=now
+        )
+        self.services = Services(self)
+        self._commands = CommandHandler(self)
+        self._answers = {
+            **self.services.answers,
+            _SET_MODE: self._take_set_mode,
+            _COMMAND_INT: self._take_command,
+            _COMMAND_LONG: self._take_command,
+        }
+        self._handled = {*self._answers, _GROUND_HEARTBEAT, _MANUAL_CONTROL, _OVERRIDE}
+        self._exchange, self._send = exchange, send
+        self._decoder = dialect.MAVLink(None)
+        self._identity: tuple[int, ...] = ()
+        self._vtol_state = 0
+        self._input_state = 0
+        self._explained = False
+        if config.parameter_file:
+            self._load_parameters(config.parameter_file)
+
+    # Datagrams
+
+    def receive(self, datagram: bytes, address: Address, *, received_ns: int, now: float) -> None:
+        """Act on one datagram.
+
+        Args:
+            datagram: What came.
+            address: From where.
+            received_ns: When, monotonic [ns].
+            now: Monotonic time [s].
+        """
+        self.now = now
+        self._exchange.header[RECEIVED] += 1
+        known = self.peers.by_address.get(address)
+        bucket = known.incoming if known is not None else self.peers.strangers
+        if len(datagram) < 8 or datagram[0] not in {0xFD, 0xFE} or not bucket.take(now):
+            self._exchange.header[DISCARDED] += 1
+            return
+        used = False
+        for frame in frames(datagram):
+            if frame.system_id in {0, self.config.system_id}:
+                continue
+            if self._signatures is not None and not self._signatures.accepts(frame):
+                continue
+            new = address not in self.peers.by_address
+            peer = self.peers.learn(address, now)
+            if peer is None:
+                break
+            used = True
+            peer.ids.add((frame.system_id, frame.component_id))
+            if new or not peer.greeted:
+                peer.greeted = True
+                self._greet(peer)
+            if frame.message_id in self._handled:
+                message = decode(frame, self._decoder)
+                if message is not None:
+                    self._dispatch(message, frame, peer, received_ns=received_ns, now=now)
+        if not used:
+            self._exchange.header[DISCARDED] += 1
+
+    def _dispatch(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
+        """Hand a message to whoever answers it."""
+        number = frame.message_id
+        if number in {_MANUAL_CONTROL, _OVERRIDE}:
+            self._take_sticks(message, frame, peer, received_ns=received_ns, now=now)
+            return
+        if number == _GROUND_HEARTBEAT:
+            if message.type == dialect.MAV_TYPE_GCS:
+                peer.last_heartbeat = now
+            return
+        if self._is_for_us(message):
+            self._answers[number](message, frame, peer)
+
+    def _is_for_us(self, message: Any) -> bool:
+        """Whether a message is addressed to us or to everybody."""
+        system = getattr(message, "target_system", 0)
+        component = getattr(message, "target_component", 0)
+        return system in {0, self.config.system_id} and component in {0, self.config.component_id}
+
+    def _take_sticks(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
+        """Take sticks from whoever holds them."""
+        manual = frame.message_id == _MANUAL_CONTROL
+        target = message.target if manual else message.target_system
+        if target not in {0, self.config.system_id}:
+            return
+        pilot = PilotId(frame.system_id, frame.component_id, peer.address)
+        before = self.lock.owner
+        if not self.lock.claim(pilot, now, release_after=self.store[OWNER_TIME]):
+            if self.lock.allowed(frame.system_id):
+                self.board.say_seldom(f"refused {pilot}", WARNING, f"Sticks are held by {before}, not {pilot}", now)
+            else:
+                self.board.say_seldom("whitelist", WARNING, f"System {frame.system_id} may not fly", now)
+            return
+        if before != self.lock.owner:
+            self.board.say(INFO, f"Sticks: {pilot}")
+        if manual:
+            bipolar = self.store[LEVER_RANGE] == 1.0
+            pressed = self.reader.manual_control(message, received_ns=received_ns, pilot=pilot, bipolar=bipolar)
+            for function in pressed:
+                self._press(function)
+        else:
+            self.reader.override(message, received_ns=received_ns, pilot=pilot)
+        sticks = self.reader.sticks
+        self._exchange.write_sticks(sticks)
+        self._exchange.header[ACCEPTED_WORD] += 1
+        if not self._explained and max(abs(sticks.lateral), abs(sticks.yaw)) > 0.2:
+            self._explained = True
+            self.board.say(INFO, "Roll and yaw are shown but do not act")
+
+    def _press(self, function: str) -> None:
+        """A button that acts once went down."""
+        if function in AID_PARAMETERS:
+            if function in self.config.aids:
+                self.request(Request("aid", function, 2.0))
+        elif function == "freeze":
+            self.request(Request("freeze"))
+        elif function == "pilot":
+            self.request(Request("pilot", "next"))
+
+    def _take_command(self, message: Any, frame: Frame, peer: Peer) -> None:
+        if frame.message_id == _COMMAND_LONG:
+            values = [getattr(message, f"param{place}") for place in range(1, 8)]
+        else:
+            values = [message.param1, message.param2, message.param3, message.param4, message.x, message.y, message.z]
+        context = CommandContext([float(value) for value in values], peer, self.now)
+        answer = self._commands.answer(message.command, context, system_id=frame.system_id)
+        self.reply(
+            peer,
+            dialect.MAVLink_command_ack_message(
+                message.command, answer.result, 255, 0, frame.system_id, frame.component_id
+            ),
+        )
+        for extra in answer.messages:
+            self.reply(peer, extra)
+        if answer.result == ACCEPTED:
+            self._tell_changes()
+
+    def _take_set_mode(self, message: Any, frame: Frame, peer: Peer) -> None:
+        """The old way to change modes; acknowledged like the command that replaced it."""
+        allowed = self.lock.allowed(frame.system_id)
+        result = self._commands.set_mode(message.custom_mode) if allowed else UNSUPPORTED
+        self.reply(
+            peer,
+            dialect.MAVLink_command_ack_message(frame.message_id, result, 255, 0, frame.system_id, frame.component_id),
+        )
+
+    # The flight
+
+    def observe(self, rows: FloatArray, now: float) -> None:
+        """Take new rows of the flight.
+
+        Args:
+            rows: Full rows, oldest first; may be empty.
+            now: Monotonic time [s].
+        """
+        first = not self.state.started
+        if self.state.observe(rows, now):
+            self.board.say(INFO, "Flight reset")
+        if first and self.state.started:
+            self.store.set(NACELLE_COMMAND, min(max(round(self.state.value("nacelle_deg"), 1), 0.0), 90.0))
+
+    def request(self, request: Request) -> None:
+        """Ask the flight for something.
+
+        Args:
+            request: What.
+        """
+        if not self._exchange.put_request(request):
+            self.board.say_seldom("queue", WARNING, "The flight does not listen", self.now)
+
+    # Sending
+
+    def send(self, peer: Peer, message: Any) -> None:
+        """Send a message to one station.
+
+        Args:
+            peer: The station.
+            message: A pymavlink message.
+        """
+        self._send(self.peers.pack(peer, message), peer.address)
+        self._exchange.header[SENT] += 1
+
+    def reply(self, peer: Peer, message: Any) -> None:
+        """Answer one station, unless it has used up its answers for now.
+
+        Args:
+            peer: The station.
+            message: A pymavlink message.
+        """
+        if peer.replies.take(self.now):
+            self.send(peer, message)
+
+    def broadcast(self, message: Any) -> None:
+        """Send a message to every station.
+
+        Args:
+            message: A pymavlink message.
+        """
+        for peer in self.peers.by_address.values():
+            self.send(peer, message)
+
+    def tick(self, now: float) -> float:
+        """Do what is due.
+
+        Args:
+            now: Monotonic time [s].
+
+        Returns:
+            When to call again at the latest, monotonic [s].
+        """
+        self.now = now
+        for severity, text in self._exchange.take_texts():
+            self.board.say(severity, text)
+        feedback = self._exchange.read_feedback()
+        if feedback is not None:
+            self.state.feedback = feedback
+        self._follow_input()
+        self._tell_changes()
+        self.services.follow_flight(now)
+        if self.state.started:
+            self.board.watch(self.state, enabled=self.store[WARNINGS] == 1.0)
+        self._look_after_peers(now)
+        self._stream(now)
+        notice = self.board.take(now)
+        if notice is not None:
+            self.broadcast(dialect.MAVLink_statustext_message(notice.severity, notice.text.encode()))
+        header = self._exchange.header
+        header[PEERS], header[ARMED] = self.peers.heard, int(self.state.armed)
+        listing = any(peer.parameter_next >= 0 for peer in self.peers.by_address.values())
+        due = min((peer.schedule.next_due for peer in self.peers.by_address.values()), default=math.inf)
+        return min(due, now + (_LIST_PAUSE_S if listing else LONGEST_PAUSE_S))
+
+    def farewell(self) -> None:
+        """Tell every station that the flight is over."""
+        self.state.armed = False
+        self.board.say(INFO, "Flight over")
+        while (notice := self.board.take(self.now)) is not None:
+            self.broadcast(dialect.MAVLink_statustext_message(notice.severity, notice.text.encode()))
+        heartbeat = self.factory.build(ids.HEARTBEAT)[0]
+        heartbeat.system_status = dialect.MAV_STATE_POWEROFF
+        self.broadcast(heartbeat)
+
+    def _stream(self, now: float) -> None:
+        """Send every stream that is due; each message is made once for all stations."""
+        made: dict[int, list[Any]] = {}
+        for peer in self.peers.by_address.values():
+            if peer.parameter_next >= 0:
+                self.services.continue_list(peer)
+            for number in peer.schedule.take_due(now):
+                if number != ids.HEARTBEAT and not self.state.started:
+                    continue
+                if number not in made:
+                    made[number] = self.factory.build(number)
+                for message in made[number]:
+                    self.send(peer, message)
+
+    def _tell_changes(self) -> None:
+        """HEARTBEAT and EXTENDED_SYS_STATE at once when what they say changes."""
+        identity = self.factory.identity
+        if identity != self._identity:
+            self._identity = identity
+            self.broadcast(self.factory.build(ids.HEARTBEAT)[0])
+        if self.state.started and self.state.vtol_state != self._vtol_state:
+            self._vtol_state = self.state.vtol_state
+            self.broadcast(self.factory.build(ids.EXTENDED_SYS_STATE)[0])
+
+    def _follow_input(self) -> None:
+        """Say when sticks are lost and when they are back."""
+        present = int(self.state.feedback.input_state)
+        if present == INPUT_LOST and self._input_state == INPUT_LIVE:
+            self.board.say(WARNING, "Sticks lost: centred, lever and nacelle held")
+        elif present == INPUT_LIVE and self._input_state == INPUT_LOST:
+            self.board.say(INFO, "Sticks regained")
+        self._input_state = present
+
+    def _look_after_peers(self, now: float) -> None:
+        owner = self.lock.owner
+        if self.lock.release_if_silent(now, release_after=self.store[OWNER_TIME]):
+            self.board.say(INFO, f"Sticks free, {owner} is silent")
+        self.peers.forget_silent(now)
+        for peer in self.peers.by_address.values():
+            self.board.watch_peer(peer, now)
+
+    def _greet(self, peer: Peer) -> None:
+        self.send(peer, self.factory.build(ids.HEARTBEAT)[0])
+        text = f"XV-15 SIM, rtsim {self.config.version}: {self.config.title}"
+        self.send(peer, dialect.MAVLink_statustext_message(INFO, text.encode("ascii", "replace")[:50]))
+
+    def _load_parameters(self, path: str) -> None:
+        """Start with stored values; the flight hears of those that differ from what it was told."""
+        try:
+            self.store.load(path)
+        except InputError as failure:
+            self.board.say(WARNING, f"Parameters not loaded: {failure}")
+            return
+        told = ParameterStore(self.config.aids, self.config.parameters)
+        for parameter in self.store.declared:
+            if self.store[parameter.name] != told[parameter.name]:
+                self.services.hand_over(parameter.name, time.monotonic())
