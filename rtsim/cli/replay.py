@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.flight_text import say
+from rtsim.cli.output import emit_json, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED
 
 
@@ -38,12 +39,12 @@ def replay_command(
 
     result = replay_log(log)
     for change in result.changed_versions:
-        console.print(f"Not the same as when it was recorded: {change}.", markup=False)
+        say(f"Not the same as when it was recorded: {change}.")
     if not result.complete:
-        console.print("The recording was cut off; what there is of it is replayed.")
+        say("The recording was cut off; what there is of it is replayed.")
     edited = result.stated_sha256 not in {None, result.recorded_sha256}
     if edited:
-        console.print("The log's rows do not have the hash it was closed with: they were damaged or edited.")
+        say("The log's rows do not have the hash it was closed with: they were damaged or edited.")
     if json:
         emit_json({"log": str(log), **_as_json(result)})
     elif result.same:

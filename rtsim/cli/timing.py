@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.flight_text import say
+from rtsim.cli.output import emit_json, results
 from rtsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def timing_command(
     if not RATE_RANGE[0] <= rate <= RATE_RANGE[1]:
         allowed = f"{RATE_RANGE[0]} to {RATE_RANGE[1]} Hz"
         raise InputError("is out of range", key="--rate", value=rate, allowed=allowed, mend="choose one")
-    console.print(f"Flying the hover at {rate} Hz for {duration:g} s; leave the machine alone meanwhile.")
+    say(f"Flying the hover at {rate} Hz for {duration:g} s; leave the machine alone meanwhile.")
     report, log = _measure(duration, rate)
     if plot is not None:
         _draw(log, plot, rate)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import threading
+from collections import deque
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 
 import scenarios
 from rtsim.errors import InputError
+from rtsim.frame import FloatArray
 from rtsim.realtime import FlightControl
 from rtsim.units import deg, kt
 from scenarios.options import Overrides, chosen_scenario
@@ -240,15 +242,18 @@ def test_switching_and_resetting_in_flight_are_events() -> None:
     control = FlightControl()
     control.step(100)
 
-    def hold_and_step() -> None:
-        control.set_pilot("hold")
-        control.step(100)
+    script = deque(
+        [
+            lambda: (control.set_pilot("hold"), control.step(100)),
+            lambda: (control.reset(), control.resume()),
+        ]
+    )
 
-    def touch() -> None:
-        threading.Timer(0.2, hold_and_step).start()
-        threading.Timer(0.4, lambda: (control.reset(), control.resume())).start()
+    def next_act(_row: FloatArray) -> None:
+        if script:
+            script.popleft()()
 
-    flight = fast("hover", duration=1.0, control=control, outputs=FlightOutputs(on_start=touch))
+    flight = fast("hover", duration=1.0, control=control, outputs=FlightOutputs(on_rows=next_act))
     assert [(event.kind, event.data.get("row")) for event in flight.events if event.kind != "end"] == [
         ("pilot", 100),
         ("reset", 200),
@@ -261,14 +266,14 @@ def test_switching_and_resetting_in_flight_are_events() -> None:
 def test_the_corridor_makes_events_unless_it_is_off(tmp_path: Path) -> None:
     path = tmp_path / "edge.toml"
     path.write_text(
-        'format = 1\nname = "edge"\ntitle = "Towards the slow side"\n[programme]\nacceleration_kt_s = 2\n'
-        "points = [{ airspeed_kt = 110, nacelle_deg = 30 }, { airspeed_kt = 85, nacelle_deg = 30, hold_s = 4 }]\n",
+        'format = 1\nname = "edge"\ntitle = "Towards the fast side"\n[programme]\nacceleration_kt_s = 2\n'
+        "points = [{ airspeed_kt = 155, nacelle_deg = 30 }, { airspeed_kt = 168, nacelle_deg = 30, hold_s = 2 }]\n",
         encoding="utf-8",
     )
     watched = fast(str(path))
     levels = [event.data["level"] for event in watched.events if event.kind == "corridor"]
     assert levels[:2] == [1, 2]  # caution, then warning
-    assert all(event.data["side"] == "low" for event in watched.events if event.kind == "corridor")
+    assert all(event.data["side"] == "high" for event in watched.events if event.kind == "corridor")
     unwatched = fast(str(path), protection="off")
     assert not [event for event in unwatched.events if event.kind == "corridor"]
     assert unwatched.history_sha256 == watched.history_sha256
