@@ -84,13 +84,16 @@ def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> 
     database = build_database(Xv15Grid(), conversion_grid(), jobs=jobs, progress=lambda part: advance(share * part))
     if without_pilot:
         return database
+    from rtsim.lpv.database import JACOBIAN_BITS, PilotArrays, round_mantissa
     from rtsim.pilot.schedule import OUTER_LOOPS, design_schedule
 
     for outer_loop in OUTER_LOOPS:
         pilot = design_schedule(
             database, outer_loop=outer_loop, jobs=jobs, progress=lambda part: advance(_PILOT_SHARE * part)
         )
-        database = database.with_pilot(outer_loop, pilot.to_arrays())
+        stored = pilot.to_arrays()
+        rounded = {name: round_mantissa(array, JACOBIAN_BITS) for name, array in stored.arrays.items()}
+        database = database.with_pilot(outer_loop, PilotArrays(rounded, stored.attributes))
     return database
 
 

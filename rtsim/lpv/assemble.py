@@ -51,6 +51,9 @@ def assemble_database(
             values[name] = _as_array(name, array, file)
     try:
         _fill(values)
+        for array in values.values():
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)  # ours alone: the database need not copy it again
         return Database(
             **values,
             states=tuple(variables["state"]),

@@ -82,6 +82,7 @@ class Database:
     """Title, condition (weight, density), versions, hash of the aircraft data."""
     pilot: Mapping[str, PilotArrays] = field(default_factory=dict)
     """Pilot gains by name of the design."""
+    _hash: str = field(default="", init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Make every array read-only, contiguous float64 and check shapes and axes."""
@@ -104,6 +105,11 @@ class Database:
     @property
     def content_hash(self) -> str:
         """SHA-256 over names, units and every number, pilot gains included: the *database hash*."""
+        if not self._hash:
+            object.__setattr__(self, "_hash", self._compute_hash())
+        return self._hash
+
+    def _compute_hash(self) -> str:
         digest = hashlib.sha256()
         for kind in (self.states, self.inputs, self.outputs):
             for variable in kind:
@@ -318,21 +324,25 @@ def fill_invalid(arrays: Mapping[str, npt.NDArray[np.generic]], airspeed: FloatA
     Raises:
         InputError: The level layer has no trim at all at some nacelle angle.
     """
-    valid = arrays["valid"]
-    order = [level_layer, *(layer for layer in range(valid.shape[0]) if layer != level_layer)]
-    for nacelle in range(valid.shape[2]):
-        for layer in order:
-            good = np.flatnonzero(valid[layer, :, nacelle])
-            if good.size == 0 and layer == level_layer:
-                raise InputError(
-                    "no trim at any airspeed",
-                    key=f"valid[{layer}, :, {nacelle}]",
-                    mend="leave this nacelle angle out",
-                )
-            for v in np.flatnonzero(~valid[layer, :, nacelle].astype(bool)):
-                source = (level_layer, int(v), nacelle)
-                if good.size:
-                    source = (layer, int(good[np.argmin(np.abs(airspeed[good] - airspeed[v]))]), nacelle)
-                for name, array in arrays.items():
-                    if name != "valid":
-                        array[layer, v, nacelle] = array[source]
+    valid = np.asarray(arrays["valid"], dtype=bool)
+    holes, sources = [], []
+    for layer, v, nacelle in np.argwhere(~valid):
+        good = np.flatnonzero(valid[layer, :, nacelle])
+        source = int(layer)
+        if not good.size:
+            source = level_layer
+            good = np.flatnonzero(valid[level_layer, :, nacelle])
+        if not good.size:
+            raise InputError(
+                "no trim at any airspeed",
+                key=f"valid[{level_layer}, :, {nacelle}]",
+                mend="leave this nacelle angle out",
+            )
+        holes.append((layer, v, nacelle))
+        sources.append((source, good[np.argmin(np.abs(airspeed[good] - airspeed[v]))], nacelle))
+    if not holes:
+        return
+    into, out_of = tuple(np.transpose(holes)), tuple(np.transpose(sources))
+    for name, array in arrays.items():
+        if name != "valid":
+            array[into] = array[out_of]

@@ -20,9 +20,9 @@ from rtsim.lpv.build import GridPoint, Guess, Jacobians
 from rtsim.units import DEGREE, KNOT
 
 WING_ALPHA_LIMIT = 16.0 * DEGREE
-"""Largest wing angle of attack of an unstalled trim in airplane and conversion mode [rad]."""
-WING_BORNE_AIRSPEED = 40.0 * KNOT
-"""Airspeed above which the wing angle of attack has a meaning for the branch [m/s]."""
+"""Largest wing angle of attack of an unstalled trim where the wing carries the aircraft [rad]."""
+WING_BORNE_AIRSPEED = 60.0 * KNOT
+"""Airspeed above which it does; slower, the rotors carry most of the weight and trims pass stall smoothly [m/s]."""
 FLYABLE_STICK = 1.0
 """Stick travel: trims beyond the stops are no trims."""
 NEIGHBOUR_PITCH, NEIGHBOUR_STICK, NEIGHBOUR_COLLECTIVE = 8.0 * DEGREE, 0.35, 8.0 * DEGREE

@@ -94,14 +94,14 @@ class ToyAircraft:
             return None
         return GridPoint(x, u, self.outputs_of(x, u, nacelle), self.derivative(x, u, nacelle))
 
-    def reject(self, point, airspeed, nacelle):
+    def reject(self, point, _airspeed, _nacelle):
         limits = point.x[1], point.y[2], point.u[1], point.u[0]
         return "out of limits" if np.any(np.abs(limits) > (0.6, 0.5, 1.0, 1.5)) else None
 
     def far_apart(self, point, neighbour):
         return abs(point.x[1] - neighbour.x[1]) > 0.3
 
-    def jacobians(self, point, airspeed, nacelle, acceleration):
+    def jacobians(self, point, _airspeed, nacelle, _acceleration):
         def difference(f, z, step=1e-5):
             columns = []
             for k in range(z.size):
@@ -119,7 +119,7 @@ class ToyAircraft:
             difference(lambda z: self.derivative(x, u, z[0]), np.array([n]))[:, 0],
         )
 
-    def flap(self, airspeed, nacelle):
+    def flap(self, _airspeed, _nacelle):
         return 0.7
 
 

@@ -37,10 +37,10 @@ class NumpyLpv:
         airspeed = x[self.iu] * np.cos(x[self.ip]) + x[self.iw] * np.sin(x[self.ip])
         result, weights = [], []
         for axis, value in ((self.d.airspeed, airspeed), (self.d.nacelle, nacelle)):
-            value = np.clip(value, axis[0], axis[-1])
-            k = int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
+            inside = np.clip(value, axis[0], axis[-1])
+            k = int(np.clip(np.searchsorted(axis, inside, side="right") - 1, 0, axis.size - 2))
             result.append(k)
-            weights.append((value - axis[k]) / (axis[k + 1] - axis[k]))
+            weights.append((inside - axis[k]) / (axis[k + 1] - axis[k]))
         (i, j), (s, t) = result, weights
         return [(i, j, (1 - s) * (1 - t)), (i, j + 1, (1 - s) * t), (i + 1, j, s * (1 - t)), (i + 1, j + 1, s * t)]
 
