@@ -9,9 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numba
-
 from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
+from rtsim.compiled import kernel
 from rtsim.frame import FloatArray
 
 # The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
@@ -60,7 +59,7 @@ class GustTables(NamedTuple):
     """Parameters of the turbulence."""
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def gust_shape(shape: float, entered: float, extent: float) -> float:
     """How much of its amplitude a gust has at a place.
 
@@ -85,7 +84,7 @@ def gust_shape(shape: float, entered: float, extent: float) -> float:
     return entered / extent
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def gust_step(
     tables: GustTables,
     state: FloatArray,
