@@ -28,15 +28,28 @@ class RowLog(Protocol):
         ...
 
     def push(self, row: FloatArray, timing: FloatArray | None = None) -> None:
-        """Keep one row."""
+        """Keep one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Its timing columns; None where the flight is not paced.
+        """
         ...
 
     def push_block(self, rows: FloatArray) -> None:
-        """Keep many rows."""
+        """Keep many rows.
+
+        Args:
+            rows: The frames, shape (frames, SIGNAL_COUNT).
+        """
         ...
 
     def event(self, event: LogEvent) -> None:
-        """Keep an event."""
+        """Keep an event.
+
+        Args:
+            event: What happened.
+        """
         ...
 
 
@@ -49,7 +62,12 @@ class RowView(Protocol):
         ...
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show one row."""
+        """Show one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Timing columns of the frame before.
+        """
         ...
 
     @property
@@ -67,7 +85,12 @@ class RowView(Protocol):
         ...
 
     def event(self, text: str, level: str = "info") -> None:
-        """Show an event."""
+        """Show an event.
+
+        Args:
+            text: What happened.
+            level: ``info``, ``caution``, ``warning`` or ``exceedance``.
+        """
         ...
 
 
