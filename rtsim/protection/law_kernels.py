@@ -106,6 +106,12 @@ class LawSettings(NamedTuple):
     """Full: sine of the steepest descent the recovery may use."""
     sink_floor: float
     """Full: sink rate always allowed to the recovery [m/s]."""
+    sink_limit: float
+    """Full: sink rate always allowed to the pilot [m/s]."""
+    sink_height: float
+    """Full: height above which more is allowed [m]."""
+    sink_time: float
+    """Full: height above that, per sink rate allowed besides [s]."""
     flapping: float
     """Full: flapping kept to [rad]."""
     torque_share: float
@@ -219,9 +225,10 @@ def _govern(
     settings = tables.settings
     bias = (state[L_BIAS], settings.bias_decay)
     time = (settings.step, settings.horizon)
+    guard = (settings.pitch, settings.pitch_frequency)
     state[L_RATE_LOW], state[L_RATE_HIGH] = -FREE, FREE
     state[L_KIND] = 0.0
-    roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, (0.0, 0.0), bias, time, out)
+    roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, (0.0, 0.0), bias, time, guard, out)
     stopped = min(out[model.OUT_LOW], out[model.OUT_HIGH])
     stopped_low, stopped_high = out[model.OUT_LOW], out[model.OUT_HIGH]
     ends = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
@@ -240,7 +247,7 @@ def _govern(
             state[L_RATE_HIGH] = back
             return
         roll_out(
-            tables.model, tables.corridor, cell, z, controls, nacelle, (back, settings.horizon), bias, time, out
+            tables.model, tables.corridor, cell, z, controls, nacelle, (back, settings.horizon), bias, time, guard, out
         )
         turned = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
         share = 0.0
@@ -255,7 +262,7 @@ def _govern(
         return
     trial = 1.0
     roll_out(
-        tables.model, tables.corridor, cell, z, controls, nacelle, (pilot_rate, settings.apply), bias, time, out
+        tables.model, tables.corridor, cell, z, controls, nacelle, (pilot_rate, settings.apply), bias, time, guard, out
     )
     margin = min(out[model.OUT_LOW], out[model.OUT_HIGH])
     low_side = out[model.OUT_LOW] < out[model.OUT_HIGH]
@@ -267,7 +274,7 @@ def _govern(
         # The margin falls about linearly with the rate; what the secant allows is tried once more.
         trial = (stopped - settings.pass_margin) / (stopped - margin)
         roll_out(
-            tables.model, tables.corridor, cell, z, controls, nacelle, (trial * pilot_rate, settings.apply), bias, time, out
+            tables.model, tables.corridor, cell, z, controls, nacelle, (trial * pilot_rate, settings.apply), bias, time, guard, out
         )
         if min(out[model.OUT_LOW], out[model.OUT_HIGH]) < settings.pass_margin:
             trial *= 0.5
@@ -300,6 +307,8 @@ def _recover(
     if state[L_RECOVER_SIDE] < 0.0:
         aim = max(airspeed, low + settings.recovery_margin)
         state[L_BLEND_REASON] = REASON_LOW
+    elif state[L_RECOVER_SIDE] == 0.0:
+        state[L_BLEND_REASON] = REASON_SINK
     else:
         aim = min(airspeed, high - settings.recovery_margin)
         state[L_BLEND_REASON] = REASON_HIGH
@@ -438,8 +447,9 @@ def law_decide(
     horizon = settings.warning_horizon
     held = state[L_ACTED_RATE] if sensors[SENSE_NACELLE_OK] != 0.0 else 0.0
     roll_out(
-        tables.model, tables.corridor, cell, z, acting, nacelle, (held, horizon), bias, (settings.warning_step, horizon), out
-    )
+        tables.model, tables.corridor, cell, z, acting, nacelle, (held, horizon), bias, (settings.warning_step, horizon),
+        (settings.pitch, settings.pitch_frequency), out,
+    )  # fmt: skip
     state[L_TIME], state[L_SIDE] = out[model.OUT_TIME], out[model.OUT_SIDE]
     law_release_unblended(state)
     if tables.law == LAW_GOVERNOR:
@@ -485,15 +495,23 @@ def _blend(
     allowed = _clip(pilot_rate, state[L_RATE_LOW], state[L_RATE_HIGH])
     roll_out(
         tables.model, tables.corridor, cell, z, asked, nacelle, (allowed, 0.5 * settings.horizon), bias,
-        (settings.step, settings.horizon), out,
+        (settings.step, settings.horizon), (settings.pitch, settings.pitch_frequency), out,
     )  # fmt: skip
     low, high = out[model.OUT_LOW], out[model.OUT_HIGH]
     margin = min(low, high)
     state[L_MARGIN] = margin
     wanted = _clip((settings.blend_begin - margin) / (settings.blend_begin - settings.blend_full), 0.0, 1.0)
-    wanted = min(wanted, _clip((altitude - settings.height_floor) / (settings.height_full - settings.height_floor), 0.0, 1.0))
     if wanted > 0.0:
         state[L_RECOVER_SIDE] = -1.0 if low < high else 1.0
+    airspeed, _, climb = flight
+    sink = max(settings.sink_limit, settings.sink_slope * abs(airspeed))
+    sink += max(0.0, altitude - settings.sink_height) / settings.sink_time
+    sinking = _clip((-climb - sink) / (0.3 * sink), 0.0, 1.0)
+    if sinking > wanted:
+        wanted = sinking
+        if state[L_BLEND] == 0.0 or state[L_RECOVER_SIDE] == 0.0:
+            state[L_RECOVER_SIDE] = 0.0
+    wanted = min(wanted, _clip((altitude - settings.height_floor) / (settings.height_full - settings.height_floor), 0.0, 1.0))
     state[L_BLEND] += _clip(wanted - state[L_BLEND], -settings.blend_fall * dt, settings.blend_rise * dt)
     if state[L_BLEND] > 0.0:
         _recover(tables, state, cell, target, z, flight)

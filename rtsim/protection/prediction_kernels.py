@@ -184,6 +184,7 @@ def roll_out(
     motion: tuple[float, float],
     bias: tuple[float, float],
     time: tuple[float, float],
+    pitch_guard: tuple[float, float],
     out: FloatArray,
 ) -> None:
     """Fly the model ahead with controls held, and find how near the corridor's boundaries it comes.
@@ -198,6 +199,8 @@ def roll_out(
         motion: Nacelle command rate [rad/s], and how long it is applied before the nacelles are stopped [s].
         bias: Acceleration the model misses now [m/s^2] and the time constant with which it dies away [s].
         time: Step and horizon [s].
+        pitch_guard: Attitude [rad] that whoever flies is taken not to pass, and how sharply it may be approached
+            [rad/s]: a stick deflection is not held until the aircraft stands on its tail.
         out: Written: ``OUT_*``.
     """
     u, w, q, pitch = start
@@ -205,6 +208,7 @@ def roll_out(
     wanted, hold = motion
     missing, decay = bias
     step, horizon = time
+    steepest, sharpness = pitch_guard
     here = angle
     frequency = tables.nacelle_frequency
     count = int(horizon / step + 0.5)
@@ -235,7 +239,9 @@ def roll_out(
         before = margin
         out[OUT_LOW_END], out[OUT_HIGH_END] = low, high
         # Semi-implicit: the fast pitch motion first, so that a step of a tenth of a second stays stable.
-        q += step * m
+        up = sharpness * (sharpness * (steepest - pitch) - 2.0 * q)
+        down = -sharpness * (sharpness * (steepest + pitch) + 2.0 * q)
+        q += step * min(max(m, down), up)
         pitch += step * q
         u += step * a
         w += step * b
