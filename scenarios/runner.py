@@ -10,12 +10,15 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_type_hints
+
+from pydantic import TypeAdapter
 
 import rtsim
 from rtsim.corridor import load_corridor
 from rtsim.errors import OutputError
 from rtsim.frame import FloatArray, history_sha256
+from rtsim.programme import Programme
 from rtsim.realtime import Executive, FlightControl, OverrunPolicy
 from rtsim.realtime.report import TimingReport
 from rtsim.simulation import FlightSetup, Simulation
@@ -186,21 +189,42 @@ def replay_setup(scenario: Scenario) -> dict[str, Any]:
     Args:
         scenario: What is flown.
     """
-    setup = flight_setup(scenario)
-    values = {field.name: getattr(setup, field.name) for field in dataclasses.fields(setup)}
-    values["programme"] = setup.programme.to_dict()
-    return {"flight": values, "pilot_name": scenario.pilot, "protection": scenario.protection}
+    return {
+        "flight": setup_to_json(flight_setup(scenario)),
+        "pilot_name": scenario.pilot,
+        "protection": scenario.protection,
+    }
+
+
+def setup_to_json(setup: FlightSetup) -> dict[str, Any]:
+    """A flight setup as JSON values: every field, since defaults may change between versions.
+
+    Args:
+        setup: What flies, how and from where.
+    """
+    values: dict[str, Any] = {"programme": setup.programme.to_dict()}
+    for field in dataclasses.fields(setup):
+        if field.name != "programme":
+            values[field.name] = _json_form(field.name).dump_python(getattr(setup, field.name), mode="json")
+    return values
 
 
 def setup_from_json(values: dict[str, Any]) -> FlightSetup:
-    """Read back what :func:`replay_setup` wrote.
+    """Read back what :func:`setup_to_json` wrote.
 
     Args:
-        values: Its ``flight`` entry.
+        values: The JSON values.
     """
-    from rtsim.programme import Programme
+    read: dict[str, Any] = {
+        name: Programme.from_dict(value) if name == "programme" else _json_form(name).validate_python(value)
+        for name, value in values.items()
+    }
+    return FlightSetup(**read)
 
-    return FlightSetup(**{**values, "programme": Programme.from_dict(values["programme"])})
+
+def _json_form(name: str) -> TypeAdapter[Any]:
+    """How a field of the setup is written to JSON and read back, from its type."""
+    return TypeAdapter(get_type_hints(FlightSetup)[name])
 
 
 def versions() -> dict[str, str]:
