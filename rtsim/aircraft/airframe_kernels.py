@@ -1,4 +1,4 @@
-"""Wing, fuselage, pylons and fins: forces [N] along body x and z and pitching moment [N m] about the centre of gravity."""
+"""Wing, fuselage, pylons and fins: forces [N] along body x and z, pitching moment [N m] about the centre of gravity."""
 
 from __future__ import annotations
 
@@ -159,11 +159,11 @@ def wing_load(
     part = min(max((flap - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
     cm = (1.0 - part) * curve(wing.moment, k, nacelle) + part * curve(wing.moment, k + 1, nacelle)
     free_area = wing.area - immersed
-    x, z, moment = wind_to_body(
-        pressure * free_area * cl, pressure * free_area * cd, u_local, w_local, arm, pressure * wing.area * wing.chord * cm
-    )
+    free = pressure * free_area
+    x, z, moment = wind_to_body(free * cl, free * cd, u_local, w_local, arm, pressure * wing.area * wing.chord * cm)
     wake_speed = wing.immersed_velocity_factor * wake[0] + wake[1]
-    normal_drag = (1.0 - part) * curve(wing.drag, 4 + k, -0.5 * math.pi) + part * curve(wing.drag, 5 + k, -0.5 * math.pi)
+    broadside = -0.5 * math.pi
+    normal_drag = (1.0 - part) * curve(wing.drag, 4 + k, broadside) + part * curve(wing.drag, 5 + k, broadside)
     download = 0.5 * air.density * wake_speed * abs(wake_speed) * immersed * normal_drag
     x_wake = -download * math.cos(nacelle)
     z_wake = download * math.sin(nacelle)

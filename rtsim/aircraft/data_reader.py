@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aircraft.rotor_reader import SEA_LEVEL_SOUND_SPEED, read_rotor
+from rtsim.aircraft.atmosphere import standard_atmosphere
+from rtsim.aircraft.rotor_reader import read_rotor
 from rtsim.aircraft.smooth_tables import smooth_curves, smooth_surface, stack_surfaces
 from rtsim.aircraft.table_kernels import Curves, FloatArray
 from rtsim.aircraft.tables import (
@@ -29,8 +30,6 @@ from rtsim.units import FOOT, INCH, KNOT, POUND, SLUG, SLUG_FOOT_SQUARED, deg, r
 
 Data = dict[str, Any]
 
-SEA_LEVEL_DENSITY = 1.225
-"""Density of the standard atmosphere at sea level [kg/m^3]."""
 ALPHA_GRID = np.radians(np.arange(-90.0, 90.5, 0.5))
 NACELLE_GRID = np.radians(np.arange(0.0, 96.0, 1.0))
 
@@ -61,7 +60,9 @@ def _against_nacelle(mast_deg: Sequence[float], rows: Sequence[Sequence[float]])
     return smooth_curves([nacelle] * len(rows), [list(reversed(row)) for row in rows], NACELLE_GRID)
 
 
-def _extended(nodes: Sequence[float], values: Sequence[float], ends: dict[float, float]) -> tuple[list[float], list[float]]:
+def _extended(
+    nodes: Sequence[float], values: Sequence[float], ends: dict[float, float]
+) -> tuple[list[float], list[float]]:
     """Add end points where a table stops short of +-90 deg; NaN entries of the print are dropped."""
     table = {a: v for a, v in zip(nodes, values, strict=True) if not np.isnan(v)}
     for alpha, value in ends.items():
@@ -105,7 +106,7 @@ def _wing(data: Data, choices: Data) -> WingTables:
     gain = interference["K_XRW"]
     x0, x1, x2 = interference["X_RW_poly_in_betam_deg"]
     geometry = data["geometry"]
-    mast = list(range(0, 31, 2)) + [45, 60, 90]
+    mast = [*range(0, 31, 2), 45, 60, 90]
     share = [
         np.sin(1.386 * (np.pi / 2 - deg(b))) + np.cos(3.114 * (np.pi / 2 - deg(b))) if b <= 30 else 0.0 for b in mast
     ]
@@ -178,7 +179,8 @@ def _tail(data: Data) -> TailTables:
     sixty = [
         [1.05 if -12.0 <= a <= 16.0 else 0.8 if a == 20.0 else 1.0] * len(speeds) for a in tail["eta_alpha_deg"]
     ]
-    ratio = [eta(tail["eta_b0_rows_alpha_cols_V"]), eta(tail["eta_b15_rows_alpha_cols_V"]), eta(flat), eta(sixty), eta(flat)]
+    printed = [tail[f"eta_b{b}_rows_alpha_cols_V"] for b in (0, 15)]
+    ratio = [eta(rows_) for rows_ in (*printed, flat, sixty, flat)]
     wake_speeds = [v * KNOT for v in wake["V_kt"]]
     wake_alpha = [deg(a) for a in [-30.0, *wake["alpha_deg"], 20.0]]
     zeros = [[0.0] * len(wake_speeds)]
@@ -254,10 +256,12 @@ def load_tables() -> AircraftTables:
     """Tables of the XV-15 at 13000 lb, sea level, 589 rpm and the flap schedule."""
     data, choices = read_data()
     rotor_speed = rpm(data["rotor"]["rpm_heli_conversion"])
+    # The same function as Xv15.at, so that a trim there is an equilibrium here to the last digit.
+    density, sound_speed = standard_atmosphere(0.0)
     configuration = Configuration(
         mass=data["mass"]["mass_slug"] * SLUG,
-        density=SEA_LEVEL_DENSITY,
-        sound_speed=SEA_LEVEL_SOUND_SPEED,
+        density=density,
+        sound_speed=sound_speed,
         rotor_speed=rotor_speed,
         flap=-1.0,
     )

@@ -62,8 +62,10 @@ def gravity_centre(mass: MassTables, nacelle: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def commanded_controls(controls: ControlTables, stick: float, lever: float, nacelle: float) -> tuple[float, float, float]:
-    """Collective at 75 % radius, longitudinal cyclic and elevator asked for by stick and lever [rad], within their limits.
+def commanded_controls(
+    controls: ControlTables, stick: float, lever: float, nacelle: float
+) -> tuple[float, float, float]:
+    """Collective at 75 % radius, longitudinal cyclic, elevator asked for by stick and lever [rad], within their limits.
 
     Args:
         controls: Gearing and limits.
@@ -204,7 +206,13 @@ def derivative(
 
 @numba.njit(cache=True, error_model="numpy")
 def outputs(
-    tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle: float, y: FloatArray, xdot: FloatArray, work: FloatArray
+    tables: AircraftTables,
+    x: FloatArray,
+    u: FloatArray,
+    nacelle: float,
+    y: FloatArray,
+    xdot: FloatArray,
+    work: FloatArray,
 ) -> None:
     """Outputs, order of ``signals.OUTPUTS``.
 

@@ -37,11 +37,13 @@ def linearize_at(aircraft: Xv15, condition: Condition, trim: TrimPoint, *, step_
     for i, size in enumerate(STATE_STEPS * step_scale):
         shift = np.zeros(x.size)
         shift[i] = size
-        columns.append((_evaluate(aircraft, x + shift, u, nacelle) - _evaluate(aircraft, x - shift, u, nacelle)) / (2 * size))
+        above, below = _evaluate(aircraft, x + shift, u, nacelle), _evaluate(aircraft, x - shift, u, nacelle)
+        columns.append((above - below) / (2 * size))
     for i, size in enumerate(INPUT_STEPS * step_scale):
         shift = np.zeros(u.size)
         shift[i] = size
-        columns.append((_evaluate(aircraft, x, u + shift, nacelle) - _evaluate(aircraft, x, u - shift, nacelle)) / (2 * size))
+        above, below = _evaluate(aircraft, x, u + shift, nacelle), _evaluate(aircraft, x, u - shift, nacelle)
+        columns.append((above - below) / (2 * size))
     step = NACELLE_STEP * step_scale
     by_nacelle = (_evaluate(aircraft, x, u, nacelle + step) - _evaluate(aircraft, x, u, nacelle - step)) / (2 * step)
     jacobian = np.array(columns).T

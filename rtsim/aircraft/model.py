@@ -52,7 +52,7 @@ class TrimPoint:
     residual: float
     """Largest residual, accelerations in m/s^2 and rad/s^2."""
     unclosed: str = ""
-    """Name of the state whose rate did not close (``elevator``: the stick would have to pass its stop); empty if converged."""
+    """Name of the state whose rate did not close (``elevator``: the stick would pass its stop); empty if converged."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,12 +107,8 @@ def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
         h00 = 1.0 - h01
         h10 = t3 - 2.0 * t2 + t
         h11 = t3 - t2
-        flow[LIFT, i] = (
-            h00 * data[i, k, 0] + h10 * data[i, k, 1] + h01 * data[i, k + 1, 0] + h11 * data[i, k + 1, 1]
-        )
-        flow[DRAG, i] = (
-            h00 * data[i, k, 2] + h10 * data[i, k, 3] + h01 * data[i, k + 1, 2] + h11 * data[i, k + 1, 3]
-        )
+        flow[LIFT, i] = h00 * data[i, k, 0] + h10 * data[i, k, 1] + h01 * data[i, k + 1, 0] + h11 * data[i, k + 1, 1]
+        flow[DRAG, i] = h00 * data[i, k, 2] + h10 * data[i, k, 3] + h01 * data[i, k + 1, 2] + h11 * data[i, k + 1, 3]
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -275,9 +271,7 @@ def inflow_rates(
     cos_skew = abs(through) / total
     l0_rate = om / rotor.apparent_mass * (thrust_coefficient - 2.0 * momentum * total)
     lateral_gain = 4.0 / ((1.0 + cos_skew) * mass_flow)
-    cosine_target = (
-        rotor.skew_gradient * sin_skew * l0 + lateral_gain * cos_skew * moment_scale * loads[COSINE_MOMENT]
-    )
+    cosine_target = rotor.skew_gradient * sin_skew * l0 + lateral_gain * cos_skew * moment_scale * loads[COSINE_MOMENT]
     sine_target = lateral_gain * moment_scale * loads[SINE_MOMENT]
     bandwidth = om / (rotor.gradient_apparent_mass * lateral_gain)
     return l0_rate, bandwidth * (cosine_target - l1c), bandwidth * (sine_target - l1s)

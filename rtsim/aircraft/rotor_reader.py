@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ def _drag_nodes(alpha: list[float], drag: list[float]) -> tuple[list[float], lis
 
 def _region_weights(edges: list[float], stations: FloatArray) -> FloatArray:
     """Weights of the four radial regions at each station, linear between the regions' middles."""
-    middles = [0.5 * (a + b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    middles = [0.5 * (a + b) for a, b in pairwise(edges)]
     weights = np.zeros((stations.size, len(middles)))
     for column in range(len(middles)):
         unit = np.zeros(len(middles))
