@@ -41,6 +41,8 @@ class StickInput(NamedTuple):
     """Nacelle switch: -1 forward (airplane), 0 let go or both pressed, 1 aft (helicopter)."""
     nacelle_angle: float = float("nan")
     """Absolute nacelle angle asked for by an axis [rad]; NaN where no axis asks."""
+    trim: int = 0
+    """Stick trim: -1 aft, 0 let go or both pressed, 1 forward."""
     buttons: int = 0
     """Buttons held, one bit each."""
     owner: int = 0

@@ -20,7 +20,7 @@ from telemetry.ring import _attach_untracked
 _MAGIC = 0x5254_5349_4D4D_4156
 _WORD = 8
 _HEADER_WORDS = 32
-_STICK_COUNT = 11
+_STICK_COUNT = 12
 _REQUEST = struct.Struct("<16s24sd")
 _REQUEST_SLOTS = 256
 _TEXT = struct.Struct("<B55s")
@@ -256,6 +256,7 @@ class Exchange:
                 float(valid),
                 float(sticks.nacelle_switch),
                 sticks.nacelle_angle,
+                float(sticks.trim),
                 float(sticks.buttons),
                 float(sticks.owner),
             )
@@ -266,7 +267,7 @@ class Exchange:
         values = self._stick.read()
         if values is None:
             return None
-        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, buttons, owner = values
+        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, trim, buttons, owner = values
         bits = int(valid)
         return StickInput(
             int(sequence),
@@ -279,6 +280,7 @@ class Exchange:
             bool(bits & 2),
             int(switch),
             angle,
+            int(trim),
             int(buttons),
             int(owner),
         )

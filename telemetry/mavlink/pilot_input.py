@@ -172,7 +172,8 @@ class StickReader:
             owner=pilot.number,
         )
         aft, forward = self.function_held("nacelle_aft"), self.function_held("nacelle_forward")
-        self.sticks = self.sticks._replace(nacelle_switch=int(aft) - int(forward))
+        trim = int(self.function_held("trim_forward")) - int(self.function_held("trim_aft"))
+        self.sticks = self.sticks._replace(nacelle_switch=int(aft) - int(forward), trim=trim)
         pressed = buttons & ~old.buttons
         return [function for function in EDGE_BUTTONS if pressed >> self._buttons[function] & 1]
 
@@ -200,6 +201,7 @@ class StickReader:
             lever_valid=throttle is not None or (old.lever_valid and not released[3]),
             nacelle_switch=_kept_switch(old.nacelle_switch, switch, released=released[5]),
             nacelle_angle=_kept_angle(old.nacelle_angle, nacelle, released=released[6]),
+            trim=0,
             buttons=0,
             owner=pilot.number,
         )

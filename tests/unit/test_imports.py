@@ -20,7 +20,7 @@ LAYERS = (
     ("rtsim.aircraft", "rtsim.corridor", "rtsim.programme", "rtsim.atmosphere", "telemetry"),
     ("rtsim.lpv",),
     ("rtsim.nacelle",),
-    ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection"),
+    ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),
     ("rtsim.simulation_kernels",),
     ("rtsim.simulation_setup",),
     ("rtsim.simulation",),
