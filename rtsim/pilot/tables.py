@@ -6,10 +6,10 @@ import numpy as np
 
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
-from rtsim.pilot import pilot_kernels as kernels
+from rtsim.pilot import layout_kernels as kernels
 from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
-from rtsim.pilot.pilot_kernels import PilotTables, noise_width, pilot_state_size
+from rtsim.pilot.layout_kernels import PilotTables, noise_width, pilot_state_size
 from rtsim.pilot.problem import FloatArray
 from rtsim.pilot.schedule import OuterLoop, ScheduledPilot
 

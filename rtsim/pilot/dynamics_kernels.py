@@ -1,0 +1,285 @@
+"""The pilot as a linear system over one held frame: rates of estimate, hands and delay, and the limits of the hands.
+
+Legend: x estimate [plant | delay | hands] (padded), u true hands before the delay, d true delay filter; A B C F l G2 as in
+the design. Matrices are stored column after column, so that each multiply-add runs down contiguous memory.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from numba import njit
+
+from rtsim.pilot.layout_kernels import (
+    INTEGRALS,
+    R_A,
+    R_B,
+    R_C,
+    R_DELAY,
+    R_DISPLAYS,
+    R_F,
+    R_G,
+    R_HANDS,
+    R_L,
+    R_PLANT,
+    FloatArray,
+    PilotTables,
+    pad4,
+)
+
+
+class Gains(NamedTuple):
+    """Interpolated gains of one frame, views into one array."""
+
+    A: FloatArray
+    """Columns of the plant's dynamics (columns, padded n)."""
+    B: FloatArray
+    """Columns of its controls (nu, padded n)."""
+    C: FloatArray
+    """Columns of the displays (columns, padded ny)."""
+    F: FloatArray
+    """Columns of the filter gain (ny, padded estimate)."""
+    L: FloatArray
+    """Columns of the commanded-control gain (n + nd, nu)."""
+    G: FloatArray
+    """Inverse neuromotor lag (nu, nu)."""
+
+
+class Held(NamedTuple):
+    """What acts constantly during a frame."""
+
+    plant: FloatArray
+    """Known accelerations of the plant (padded n)."""
+    displays: FloatArray
+    """Deviations read (padded ny)."""
+    command: FloatArray
+    """Commands of the outer loops (nu,)."""
+    limit: FloatArray
+    """What limits take off the hands' rates (nu,)."""
+    motor: FloatArray
+    """Motor noise on the hands' rates (nu,)."""
+
+
+class Motion(NamedTuple):
+    """Estimate, true hands and true delay filter, or their rates."""
+
+    x: FloatArray
+    """Estimate (padded)."""
+    u: FloatArray
+    """Hands (nu,)."""
+    d: FloatArray
+    """Delay filter (nd,)."""
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
+    """Look at an interpolated cell as matrices.
+
+    Args:
+        tables: Prepared pilot.
+        cell: Interpolated gains.
+
+    Returns:
+        Views into the cell.
+    """
+    roles = tables.roles
+    hands = roles[R_HANDS]
+    displays = roles[R_DISPLAYS]
+    seen = pad4(displays)
+    slow = roles[R_PLANT] + roles[R_DELAY]
+    rows = pad4(roles[R_PLANT])
+    wide = pad4(slow + hands)
+    a = tables.a_columns.shape[0]
+    c = tables.c_columns.shape[0]
+    return Gains(
+        cell[roles[R_A] : roles[R_A] + a * rows].reshape((a, rows)),
+        cell[roles[R_B] : roles[R_B] + hands * rows].reshape((hands, rows)),
+        cell[roles[R_C] : roles[R_C] + c * seen].reshape((c, seen)),
+        cell[roles[R_F] : roles[R_F] + displays * wide].reshape((displays, wide)),
+        cell[roles[R_L] : roles[R_L] + slow * hands].reshape((slow, hands)),
+        cell[roles[R_G] : roles[R_G] + hands * hands].reshape((hands, hands)),
+    )
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def rates(
+    tables: PilotTables, gains: Gains, held: Held, at: Motion, frozen: bool, out: Motion, scratch: FloatArray
+) -> None:
+    """Rates of the pilot at held displays.
+
+    Args:
+        tables: Prepared pilot.
+        gains: Gains of this frame.
+        held: What acts constantly.
+        at: Estimate, hands and delay filter.
+        frozen: The integrals stand still.
+        out: Receives the rates.
+        scratch: Room for the padded displays and the hands.
+    """
+    n = tables.roles[R_PLANT]
+    delay = tables.roles[R_DELAY]
+    hands = tables.roles[R_HANDS]
+    x, u, d = at.x, at.u, at.d
+    dx, du, dd = out.x, out.u, out.d
+    rows = gains.A.shape[1]
+    seen = gains.C.shape[1]
+    wide = gains.F.shape[1]
+    innovation = scratch[:seen]
+    wanted = scratch[seen : seen + hands]
+    for k in range(wide):
+        dx[k] = 0.0
+    for k in range(rows):
+        dx[k] = held.plant[k]
+    for c in range(gains.A.shape[0]):
+        value = x[tables.a_columns[c]]
+        column = gains.A[c]
+        for k in range(rows):
+            dx[k] += column[k] * value
+    for hand in range(hands):
+        value = tables.delay_d[hand] * x[n + delay + hand]
+        for k in range(delay):
+            value += tables.model_delay_c[hand, k] * x[n + k]
+        column = gains.B[hand]
+        for k in range(rows):
+            dx[k] += column[k] * value
+    if frozen:
+        for k in range(n - INTEGRALS, n):
+            dx[k] = 0.0
+    for k in range(delay):
+        model = 0.0
+        true = 0.0
+        for m in range(delay):
+            model += tables.model_delay_a[k, m] * x[n + m]
+            true += tables.output_delay_a[k, m] * d[m]
+        for hand in range(hands):
+            model += tables.delay_b[k, hand] * x[n + delay + hand]
+            true += tables.delay_b[k, hand] * u[hand]
+        dx[n + k] = model
+        dd[k] = true
+    for hand in range(hands):
+        wanted[hand] = held.command[hand]
+    for k in range(gains.L.shape[0]):
+        for hand in range(hands):
+            wanted[hand] -= gains.L[k, hand] * x[k]
+    for hand in range(hands):
+        model = held.limit[hand]
+        true = model + held.motor[hand]
+        for other in range(hands):
+            model += gains.G[hand, other] * (wanted[other] - x[n + delay + other])
+            true += gains.G[hand, other] * (wanted[other] - u[other])
+        dx[n + delay + hand] = model
+        du[hand] = true
+    for k in range(seen):
+        innovation[k] = held.displays[k]
+    for c in range(gains.C.shape[0]):
+        value = x[tables.c_columns[c]]
+        column = gains.C[c]
+        for k in range(seen):
+            innovation[k] -= column[k] * value
+    for display in range(gains.F.shape[0]):
+        value = innovation[display]
+        column = gains.F[display]
+        for k in range(wide):
+            dx[k] += column[k] * value
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def limit_hands(tables: PilotTables, gains: Gains, held: Held, at: Motion, trim: FloatArray) -> bool:
+    """Limit rate and travel of the hands at the start of a frame.
+
+    Args:
+        tables: Prepared pilot.
+        gains: Gains of this frame.
+        held: ``limit`` receives what is taken off the hands' rates.
+        at: Estimate and hands.
+        trim: Pitch and hands of the commanded trim.
+
+    Returns:
+        Whether anything was taken off.
+    """
+    hands = tables.roles[R_HANDS]
+    limited = False
+    for hand in range(hands):
+        rate = 0.0
+        for other in range(hands):
+            wanted = held.command[other]
+            for k in range(gains.L.shape[0]):
+                wanted -= gains.L[k, other] * at.x[k]
+            rate += gains.G[hand, other] * (wanted - at.u[other])
+        allowed = min(tables.limits[2, hand], max(-tables.limits[2, hand], rate))
+        position = trim[1 + hand] + at.u[hand]
+        if (position >= tables.limits[1, hand] and allowed > 0.0) or (
+            position <= tables.limits[0, hand] and allowed < 0.0
+        ):
+            allowed = 0.0
+        held.limit[hand] = allowed - rate
+        limited = limited or allowed != rate
+    return limited
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def motion_of(tables: PilotTables, work: FloatArray) -> Motion:
+    """Look at an array as estimate, hands and delay filter.
+
+    Args:
+        tables: Prepared pilot.
+        work: Array of `motion_size` values.
+
+    Returns:
+        Views into the array.
+    """
+    roles = tables.roles
+    hands = roles[R_HANDS]
+    delay = roles[R_DELAY]
+    wide = pad4(roles[R_PLANT] + delay + hands)
+    return Motion(work[:wide], work[wide : wide + hands], work[wide + hands : wide + hands + delay])
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def motion_size(tables: PilotTables) -> int:
+    """Length of an array for `motion_of`.
+
+    Args:
+        tables: Prepared pilot.
+
+    Returns:
+        The number of float64 values.
+    """
+    roles = tables.roles
+    return pad4(roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]) + roles[R_HANDS] + roles[R_DELAY]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def held_of(tables: PilotTables, work: FloatArray) -> Held:
+    """Look at an array as what acts constantly during a frame.
+
+    Args:
+        tables: Prepared pilot.
+        work: Array of `held_size` values.
+
+    Returns:
+        Views into the array.
+    """
+    hands = tables.roles[R_HANDS]
+    rows = pad4(tables.roles[R_PLANT])
+    command = rows + pad4(tables.roles[R_DISPLAYS])
+    return Held(
+        work[:rows],
+        work[rows:command],
+        work[command : command + hands],
+        work[command + hands : command + 2 * hands],
+        work[command + 2 * hands : command + 3 * hands],
+    )
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def held_size(tables: PilotTables) -> int:
+    """Length of an array for `held_of`.
+
+    Args:
+        tables: Prepared pilot.
+
+    Returns:
+        The number of float64 values.
+    """
+    return pad4(tables.roles[R_PLANT]) + pad4(tables.roles[R_DISPLAYS]) + 3 * tables.roles[R_HANDS]

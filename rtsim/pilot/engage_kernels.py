@@ -1,0 +1,180 @@
+"""How the pilot takes over: its first output is the present stick and lever, and it captures what is asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from rtsim.pilot.layout_kernels import (
+    INTEGRALS,
+    LOOP_INTEGRATORS,
+    N_KI_H,
+    N_KI_V,
+    N_KP_H,
+    N_KP_V,
+    N_Z_H,
+    N_Z_V,
+    OFFSETS,
+    R_DELAY,
+    R_DISPLAYS,
+    R_END,
+    R_HANDS,
+    R_L,
+    R_LOOP,
+    R_PLANT,
+    R_Q,
+    R_U,
+    R_W,
+    REF_AIRSPEED,
+    S_ESTIMATE,
+    S_FILTERED,
+    FloatArray,
+    PilotTables,
+    clip,
+    commanded_trim,
+    interpolate,
+    observe,
+    outer_command,
+    own_reference,
+    pad4,
+    plant_reference,
+)
+
+
+@njit(cache=True, error_model="numpy")
+def mocm_engage(
+    tables: PilotTables,
+    state: FloatArray,
+    x: FloatArray,
+    nacelle_angle: float,
+    nacelle_rate: float,
+    reference: FloatArray,
+    present: FloatArray,
+) -> None:
+    """Let the pilot take over without a step: its first output is the present stick and lever.
+
+    The pilot's own reference starts at the present airspeed, altitude and climb rate and leads from there to what is
+    asked for. The estimate starts at the true deviations, without gusts. The integrals are set so that the present controls are
+    also what the pilot wants, as far as their limits allow; from there it steers to the reference.
+
+    Args:
+        tables: Prepared pilot.
+        state: The pilot's state, overwritten.
+        x: Aircraft state.
+        nacelle_angle: Nacelle angle [rad].
+        nacelle_rate: Nacelle rate [rad/s] (unused: its effect is known from the first frame on).
+        reference: What is asked for, see the module.
+        present: Stick and lever that act now.
+    """
+    roles = tables.roles
+    n = roles[R_PLANT]
+    delay = roles[R_DELAY]
+    hands = roles[R_HANDS]
+    estimate = n + delay + hands
+    hands_at = S_ESTIMATE + estimate
+    delay_at = hands_at + hands
+    integrals_at = delay_at + delay
+    last_at = integrals_at + INTEGRALS
+    trim = np.zeros(4 * (1 + hands))
+    errors = np.zeros(pad4(roles[R_DISPLAYS]))
+    cell = np.zeros(roles[R_END])
+    for k in range(state.shape[0]):
+        state[k] = 0.0
+    own = np.zeros(OFFSETS)
+    airspeed = observe(tables, x, reference, 0.0, 0.0, errors)
+    state[S_FILTERED] = airspeed
+    offset_at = last_at + n
+    state[offset_at] = errors[0]
+    state[offset_at + 2] = errors[1]
+    state[offset_at + 3] = errors[2]
+    own_reference(state, reference, own)
+    commanded_trim(tables, own, nacelle_angle, trim)
+    observe(tables, x, own, trim[0], 0.0, errors)
+    interpolate(tables, tables.cells, airspeed, nacelle_angle, roles[R_END], cell)
+    plant_reference(tables, own, trim, 0.0, state[last_at : last_at + n])
+    state[S_ESTIMATE + 0] = x[roles[R_U]] - state[last_at + 0]
+    state[S_ESTIMATE + 1] = x[roles[R_W]] - state[last_at + 1]
+    state[S_ESTIMATE + 2] = x[roles[R_Q]]
+    state[S_ESTIMATE + 3] = errors[3]
+    state[S_ESTIMATE + 4] = errors[1]
+    for hand in range(hands):
+        held = present[hand] - trim[1 + hand]
+        if tables.lags[hand] >= 0:
+            state[S_ESTIMATE + tables.lags[hand]] = held
+        state[S_ESTIMATE + n + delay + hand] = held
+        state[hands_at + hand] = held
+    _rest_delay(tables, tables.model_delay_a, state, hands_at, S_ESTIMATE + n)
+    _rest_delay(tables, tables.output_delay_a, state, hands_at, delay_at)
+    _start_integrals(tables, cell, state, trim, own[REF_AIRSPEED], errors)
+
+
+@njit(cache=True, error_model="numpy")
+def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at: int, delay_at: int) -> None:
+    """Put a delay filter at rest at the present hands: a x_d = -b u_p, by elimination."""
+    delay = tables.roles[R_DELAY]
+    if delay == 0:
+        return
+    matrix = np.zeros((delay, delay + 1))
+    for k in range(delay):
+        for m in range(delay):
+            matrix[k, m] = a[k, m]
+        for hand in range(tables.roles[R_HANDS]):
+            matrix[k, delay] -= tables.delay_b[k, hand] * state[hands_at + hand]
+    for k in range(delay):
+        pivot = k
+        for m in range(k + 1, delay):
+            if abs(matrix[m, k]) > abs(matrix[pivot, k]):
+                pivot = m
+        for column in range(delay + 1):
+            matrix[k, column], matrix[pivot, column] = matrix[pivot, column], matrix[k, column]
+        for m in range(delay):
+            if m != k:
+                factor = matrix[m, k] / matrix[k, k]
+                for column in range(k, delay + 1):
+                    matrix[m, column] -= factor * matrix[k, column]
+    for k in range(delay):
+        state[delay_at + k] = matrix[k, delay] / matrix[k, k]
+
+
+@njit(cache=True, error_model="numpy")
+def _start_integrals(
+    tables: PilotTables, cell: FloatArray, state: FloatArray, trim: FloatArray, airspeed: float, errors: FloatArray
+) -> None:
+    """Choose the integrals so that the wanted controls equal the present ones, within the integrals' limits."""
+    roles = tables.roles
+    numbers = tables.numbers
+    n = roles[R_PLANT]
+    delay = roles[R_DELAY]
+    hands = roles[R_HANDS]
+    hands_at = S_ESTIMATE + n + delay + hands
+    integrals_at = hands_at + hands + delay
+    inner = roles[R_LOOP] == LOOP_INTEGRATORS
+    if hands != INTEGRALS:
+        return
+    # two equations, effect of each integral on each hand's command = what is missing
+    m = np.zeros((2, 2))
+    missing = np.zeros(2)
+    for hand in range(hands):
+        missing[hand] = state[hands_at + hand]
+        for k in range(n + delay):
+            missing[hand] += cell[roles[R_L] + hands * k + hand] * state[S_ESTIMATE + k]
+        if inner:
+            m[hand, 0] = -cell[roles[R_L] + hands * (n - 2) + hand]
+            m[hand, 1] = -cell[roles[R_L] + hands * (n - 1) + hand]
+        else:
+            m[hand, 0] = outer_command(tables, cell, trim, airspeed, -numbers[N_KI_V], 0.0, hand)
+            m[hand, 1] = outer_command(tables, cell, trim, airspeed, 0.0, -numbers[N_KI_H], hand)
+            missing[hand] -= outer_command(
+                tables, cell, trim, airspeed, -numbers[N_KP_V] * errors[0], -numbers[N_KP_H] * errors[1], hand
+            )
+    determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
+    size = (abs(m[0, 0]) + abs(m[1, 0])) * (abs(m[0, 1]) + abs(m[1, 1]))
+    if abs(determinant) <= 1e-6 * size:
+        return
+    z_v = (missing[0] * m[1, 1] - missing[1] * m[0, 1]) / determinant
+    z_h = (m[0, 0] * missing[1] - m[1, 0] * missing[0]) / determinant
+    state[integrals_at] = clip(z_v, numbers[N_Z_V])
+    state[integrals_at + 1] = clip(z_h, numbers[N_Z_H])
+    if inner:
+        state[S_ESTIMATE + n - 2] = state[integrals_at]
+        state[S_ESTIMATE + n - 1] = state[integrals_at + 1]

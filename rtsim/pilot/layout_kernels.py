@@ -1,0 +1,366 @@
+"""The scheduled pilot in flat arrays: positions, tables, interpolation, the moving trim and what the pilot sees."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+REF_AIRSPEED = 0
+"""Position in ``reference``: filtered airspeed asked for [m/s]."""
+REF_AIRSPEED_RATE = 1
+"""Position in ``reference``: its rate [m/s^2]."""
+REF_ALTITUDE = 2
+"""Position in ``reference``: altitude asked for [m]."""
+REF_CLIMB = 3
+"""Position in ``reference``: its rate [m/s]."""
+REF_NACELLE_RATE = 4
+"""Position in ``reference``: nacelle rate commanded for the frame [rad/s]; the pilot's third channel, not used here."""
+REFERENCE_SIZE = 5
+"""Length of ``reference``."""
+
+LOOP_INTEGRATORS = 0
+"""Airspeed and altitude held by integrators inside the design (default)."""
+LOOP_PI = 1
+"""Airspeed and altitude held by outer PI loops that move the state reference (the paper's structure)."""
+
+# positions in PilotTables.roles
+R_LOOP = 0
+R_PLANT = 1
+R_DELAY = 2
+R_HANDS = 3
+R_DISPLAYS = 4
+R_U = 5
+R_W = 6
+R_Q = 7
+R_PITCH = 8
+R_ALTITUDE = 9
+R_A = 10
+R_B = 11
+R_N = 12
+R_C = 13
+R_F = 14
+R_L = 15
+R_G = 16
+R_V = 17
+R_END = 18
+R_COUNT = 19
+
+# positions in PilotTables.numbers
+N_GUST_LEAST = 0
+N_FILTER = 1
+N_ACCELERATION_LIMIT = 2
+N_CLIMB_SPEED = 3
+N_KP_V = 4
+N_KI_V = 5
+N_KP_H = 6
+N_KI_H = 7
+N_Z_V = 8
+N_Z_H = 9
+N_DT = 10
+N_COUNT = 11
+
+SAME_CONTROL = 1e-9
+"""Applied and demanded controls closer than this are the same (rounding must not freeze the integrals)."""
+CAPTURE_FREQUENCY = 0.4
+"""After taking over, the pilot leads its own reference from where the aircraft is to what is asked, at this rate [rad/s]."""
+CAPTURE_AIRSPEED_RATE = 1.5
+"""Fastest capture of an airspeed [m/s^2]."""
+CAPTURE_CLIMB = 4.0
+"""Fastest capture of an altitude [m/s]."""
+CAPTURE_AIRSPEED_JERK = 1.5
+"""Largest rate of change of the capture's acceleration [m/s^3]."""
+CAPTURE_CLIMB_RATE = 4.0
+"""Largest vertical acceleration of the capture [m/s^2]."""
+LARGEST_AIRSPEED_ERROR = 10.0
+"""Farther from its reference the pilot gives the reference up and captures it again [m/s]."""
+LARGEST_ALTITUDE_ERROR = 20.0
+"""The same for altitude [m]."""
+OFFSETS = 4
+"""Distance of the pilot's own reference from what is asked: airspeed, its rate, altitude, climb rate."""
+INTEGRALS = 2
+"""Airspeed and altitude are integrated."""
+S_FILTERED = 0
+"""Position in the state: filtered airspeed that schedules the gains [m/s]."""
+S_LIMITED = 1
+"""Position in the state: 1 while a hand was limited or overruled in the last frame."""
+S_ESTIMATE = 2
+"""Position in the state of the estimate; hands, delay filter, integrals and last reference follow."""
+
+
+class PilotTables(NamedTuple):
+    """A scheduled pilot prepared by ``rtsim.pilot.tables.load_pilot_tables``; read-only."""
+
+    airspeed: FloatArray
+    """Airspeed axis (V,) [m/s]."""
+    nacelle: FloatArray
+    """Nacelle axis (N,) [rad]."""
+    trim: FloatArray
+    """[pitch, hands] of the level trim; coefficients of acceleration, of its square; slopes with airspeed (V, N, ...)."""
+    cells: FloatArray
+    """Design plant and gains of each grid point, flattened by columns (V, N, block)."""
+    a_columns: IntArray
+    """Plant states with a column in A."""
+    c_columns: IntArray
+    """Plant states with a column in C."""
+    lags: IntArray
+    """Plant state that is the actuator lag of each hand; -1 where there is none (nu,)."""
+    model_delay_a: FloatArray
+    """Dynamics of the internal model's delay filter (nd, nd)."""
+    delay_b: FloatArray
+    """Input of the delay filters (nd, nu)."""
+    model_delay_c: FloatArray
+    """Output of the internal model's delay filter (nu, nd)."""
+    delay_d: FloatArray
+    """Feed-through of the delay filters (nu,)."""
+    output_delay_a: FloatArray
+    """Dynamics of the true delay filter, shorter by one frame (nd, nd)."""
+    output_delay_c: FloatArray
+    """Output of the true delay filter (nu, nd)."""
+    limits: FloatArray
+    """Rows: least, greatest, fastest [1/s]; columns: hands (3, nu)."""
+    numbers: FloatArray
+    """Scalars (``N_*``)."""
+    roles: IntArray
+    """Loop, sizes, positions of aircraft states and of the sections of a cell (``R_*``)."""
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def pad4(count: int) -> int:
+    """Round up to a multiple of four, the width of a vector register.
+
+    Args:
+        count: A number of rows.
+
+    Returns:
+        The padded number.
+    """
+    return 4 * ((count + 3) // 4)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def pilot_state_size(tables: PilotTables) -> int:
+    """Length of the pilot's state array.
+
+    Args:
+        tables: Prepared pilot.
+
+    Returns:
+        The number of float64 values.
+    """
+    roles = tables.roles
+    estimate = roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]
+    return S_ESTIMATE + estimate + roles[R_HANDS] + roles[R_DELAY] + INTEGRALS + roles[R_PLANT] + OFFSETS
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def noise_width(tables: PilotTables) -> int:
+    """Standard normals the pilot takes per frame when its noise is on: one per display and hand.
+
+    Args:
+        tables: Prepared pilot.
+
+    Returns:
+        The number.
+    """
+    return tables.roles[R_DISPLAYS] + tables.roles[R_HANDS]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def clip(value: float, limit: float) -> float:
+    return min(limit, max(-limit, value))
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _cell_below(axis: FloatArray, value: float) -> int:
+    low = 0
+    high = axis.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if axis[middle] <= value:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def interpolate(
+    tables: PilotTables, cells: FloatArray, airspeed: float, nacelle_angle: float, last: int, out: FloatArray
+) -> None:
+    """Keep a value within plus and minus a limit.
+
+    Args:
+        value: The value.
+        limit: The limit.
+    """
+    i = _cell_below(tables.airspeed, airspeed)
+    j = _cell_below(tables.nacelle, nacelle_angle)
+    s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
+    t = (nacelle_angle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
+    s = min(1.0, max(0.0, s))
+    t = min(1.0, max(0.0, t))
+    w0 = (1.0 - s) * (1.0 - t)
+    w1 = (1.0 - s) * t
+    w2 = s * (1.0 - t)
+    w3 = s * t
+    for k in range(last):
+        out[k] = w0 * cells[i, j, k] + w1 * cells[i, j + 1, k] + w2 * cells[i + 1, j, k] + w3 * cells[i + 1, j + 1, k]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: float, out: FloatArray) -> None:
+    """Pitch and hands of the commanded trim.
+
+    Args:
+        tables: Prepared pilot.
+        reference: What is asked for.
+        nacelle_angle: Nacelle angle [rad].
+        out: ``[:1 + nu]`` receives pitch and hands, ``[3 (1 + nu):4 (1 + nu)]`` their slopes with airspeed; the rest
+            is scratch.
+    """
+    count = 1 + tables.roles[R_HANDS]
+    interpolate(tables, tables.trim, reference[REF_AIRSPEED], nacelle_angle, 4 * count, out)
+    limit = tables.numbers[N_ACCELERATION_LIMIT]
+    a = min(limit, max(-limit, reference[REF_AIRSPEED_RATE]))
+    for k in range(count):
+        out[k] += a * (out[count + k] + a * out[2 * count + k])
+    # climbing keeps the angle of attack: pitch rises by the path angle, which fades out towards hover
+    climb_speed = tables.numbers[N_CLIMB_SPEED]
+    speed = reference[REF_AIRSPEED]
+    out[0] += reference[REF_CLIMB] * speed / (speed * speed + climb_speed * climb_speed)
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def own_reference(state: FloatArray, reference: FloatArray, out: FloatArray) -> None:
+    """Write what is asked for plus the offset of a capture in progress (zero in ordinary flight).
+
+    Args:
+        state: The pilot's state.
+        reference: What is asked for.
+        out: Receives airspeed, airspeed rate, altitude and climb rate.
+    """
+    first = state.shape[0] - OFFSETS
+    for k in range(OFFSETS):
+        out[k] = reference[k] + state[first + k]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def observe(
+    tables: PilotTables, x: FloatArray, reference: FloatArray, pitch: float, pitch_rate: float, out: FloatArray
+) -> float:
+    """Write the deviations of the displays from the reference; the integrals are not among them.
+
+    Args:
+        tables: Prepared pilot.
+        x: Aircraft state.
+        reference: What is asked for.
+        pitch: Pitch of the moving trim [rad].
+        pitch_rate: Its rate [rad/s].
+        out: Receives deviations of airspeed, altitude, climb rate, pitch, pitch rate.
+
+    Returns:
+        The airspeed [m/s].
+    """
+    roles = tables.roles
+    sine = math.sin(x[roles[R_PITCH]])
+    cosine = math.cos(x[roles[R_PITCH]])
+    u = x[roles[R_U]]
+    w = x[roles[R_W]]
+    airspeed = u * cosine + w * sine
+    out[0] = airspeed - reference[REF_AIRSPEED]
+    out[1] = x[roles[R_ALTITUDE]] - reference[REF_ALTITUDE]
+    out[2] = u * sine - w * cosine - reference[REF_CLIMB]
+    out[3] = x[roles[R_PITCH]] - pitch
+    out[4] = x[roles[R_Q]] - pitch_rate
+    return airspeed
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def plant_reference(
+    tables: PilotTables, reference: FloatArray, trim: FloatArray, pitch_rate: float, out: FloatArray
+) -> None:
+    """Write the moving trim in the design plant's states.
+
+    Args:
+        tables: Prepared pilot.
+        reference: What is asked for.
+        trim: Pitch and hands, from `commanded_trim`.
+        pitch_rate: Rate of the trim's pitch [rad/s].
+        out: Receives the plant states.
+    """
+    roles = tables.roles
+    sine = math.sin(trim[0])
+    cosine = math.cos(trim[0])
+    for k in range(roles[R_PLANT]):
+        out[k] = 0.0
+    out[0] = reference[REF_AIRSPEED] * cosine + reference[REF_CLIMB] * sine
+    out[1] = reference[REF_AIRSPEED] * sine - reference[REF_CLIMB] * cosine
+    out[2] = pitch_rate
+    out[3] = trim[0]
+    out[4] = reference[REF_ALTITUDE]
+    for hand in range(roles[R_HANDS]):
+        if tables.lags[hand] >= 0:
+            out[tables.lags[hand]] = trim[1 + hand]
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def outer_command(
+    tables: PilotTables, cell: FloatArray, trim: FloatArray, airspeed: float, dv: float, dh: float, hand: int
+) -> float:
+    """Say what a hand is asked for by moving the reference to a trim dv faster, and dh upwards.
+
+    The whole trim moves, pitch and controls too: moving only the speed has the wrong sign on the back side of the power
+    curve, where slower flight takes more power.
+
+    Args:
+        tables: Prepared pilot.
+        cell: Gains.
+        trim: Pitch, hands and their slopes, from `commanded_trim`.
+        airspeed: Commanded airspeed [m/s].
+        dv: Airspeed command of the outer loop [m/s].
+        dh: Altitude command of the outer loop [m].
+        hand: Number of the hand.
+
+    Returns:
+        The hand's command.
+    """
+    hands = tables.roles[R_HANDS]
+    slopes = 3 * (1 + hands)
+    place = tables.roles[R_L] + hand
+    sine = math.sin(trim[0])
+    cosine = math.cos(trim[0])
+    pitch_slope = trim[slopes]
+    along = trim[slopes + 1 + hand]
+    along += cell[place] * (cosine - airspeed * sine * pitch_slope)
+    along += cell[place + hands] * (sine + airspeed * cosine * pitch_slope)
+    along += cell[place + 3 * hands] * pitch_slope
+    for other in range(hands):
+        if tables.lags[other] >= 0:
+            along += cell[place + hands * tables.lags[other]] * trim[slopes + 1 + other]
+    return along * dv + cell[place + 4 * hands] * dh
+
+
+@njit(cache=True, error_model="numpy", _nrt=False)
+def demand(tables: PilotTables, state: FloatArray, hand: int) -> float:
+    """Deviation of a hand's control after the true delay.
+
+    Args:
+        tables: Prepared pilot.
+        state: The pilot's state.
+        hand: Number of the hand.
+    """
+    roles = tables.roles
+    delay = roles[R_DELAY]
+    hands_at = S_ESTIMATE + roles[R_PLANT] + delay + roles[R_HANDS]
+    delay_at = hands_at + roles[R_HANDS]
+    total = tables.delay_d[hand] * state[hands_at + hand]
+    for k in range(delay):
+        total += tables.output_delay_c[hand, k] * state[delay_at + k]
+    return total
