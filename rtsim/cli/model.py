@@ -234,10 +234,10 @@ def _inside_corridor(database: Database) -> npt.NDArray[np.bool_]:
 
 def _is_current(database: Database) -> bool | None:
     """Whether the aircraft has not changed since the database was built; None where it is not ours."""
-    from rtsim.lpv.xv15 import source_sha256
+    from rtsim.lpv.xv15 import source_sha256, still_trims
 
     stored = database.attributes.get("source_sha256")
-    return None if stored is None else stored == source_sha256()
+    return None if stored is None else stored == source_sha256() and still_trims(database)
 
 
 def _valid_range(database: Database, layer: int, nacelle: int) -> list[float]:

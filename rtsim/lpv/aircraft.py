@@ -171,7 +171,7 @@ class LpvAircraft:
             states=[variable.name for variable in self.database.states],
             inputs=[variable.name for variable in self.database.inputs],
             outputs=[variable.name for variable in self.database.outputs],
-            name=f"{to_kt(airspeed):.0f} kn, nacelle {to_deg(nacelle):.1f} deg",
+            name=f"{to_kt(airspeed):.0f} kn, nacelle {to_deg(nacelle):.0f} deg",
         )  # fmt: skip
 
     def matrices(self, *, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
