@@ -75,7 +75,6 @@ class FlightState:
         self.row, self.timing = rows[-1, :SIGNAL_COUNT], rows[-1, SIGNAL_COUNT:]
         self.worst_level = max(self.worst_level, int(np.max(rows[:, COLUMN.corridor_level])))
         self._arrival_s = now
-        self._update_vtol_state()
         return reset
 
     def value(self, name: str) -> float:
@@ -145,7 +144,7 @@ class FlightState:
         """Power lever as the hands hold it; the acting one while nobody's hands fly."""
         return self.feedback.lever if self.pilot == PILOT_EXTERNAL else self.value("lever")
 
-    def _update_vtol_state(self) -> None:
+    def update_vtol_state(self) -> None:
         """Helicopter above 85 deg, airplane below 2 deg, else the way the nacelles move, moved last, or are sent."""
         angle, rate = self.value("nacelle_deg"), self.value("nacelle_rate_deg_s")
         asked = int(self.feedback.transition)

@@ -299,6 +299,8 @@ class Vehicle:
         feedback = self._exchange.read_feedback()
         if feedback is not None:
             self.state.feedback = feedback
+        if self.state.started:
+            self.state.update_vtol_state()
         self._follow_input()
         self._tell_changes()
         self.services.follow_flight(now)

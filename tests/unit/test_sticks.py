@@ -135,7 +135,7 @@ def test_detent_switch_runs_to_the_next_detent_and_stops():
     _, angles = fly(hands, press, frames=800)
     assert to_deg(angles[-1]) == pytest.approx(75.0, abs=1e-9)
     fly(hands, LIVE, frames=5, command_angle=angles[-1])
-    fly_press, one = fly(hands, press, frames=2, command_angle=angles[-1])
+    _fly_press, one = fly(hands, press, frames=2, command_angle=angles[-1])
     _, angles = fly(hands, LIVE, frames=1200, command_angle=one[-1])
     assert to_deg(angles[-1]) == pytest.approx(50.0, abs=1e-9)
     _, one = fly(hands, LIVE._replace(nacelle_switch=1), frames=2, command_angle=angles[-1])

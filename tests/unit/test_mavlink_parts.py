@@ -1,0 +1,260 @@
+"""Shared memory, framing, signing, settings and parameters of the MAVLink vehicle."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as dialect
+
+from rtsim.command import StickInput
+from rtsim.errors import InputError
+from telemetry.child_process import child_environment
+from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, endpoints, read_signing_key
+from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
+from telemetry.mavlink.framing import SignatureCheck, frames, signature_time
+from telemetry.mavlink.parameters import AID_PARAMETERS, PARAMETERS, ParameterStore
+from telemetry.mavlink.peers import TokenBucket
+from telemetry.mavlink.pilot_input import StickReader
+from telemetry.mavlink.streams import StreamSchedule
+
+KEY = bytes(range(32))
+
+
+@pytest.fixture(name="pair")
+def _pair():
+    first = Exchange()
+    second = Exchange(first.name)
+    yield first, second
+    second.close()
+    first.close()
+
+
+def test_sticks_feedback_requests_and_texts_travel_whole(pair):
+    flight, vehicle = pair
+    sticks = StickInput(7, 10**15 + 1, 0.5, 0.25, -0.1, 0.2, True, False, -1, 1.5, 1, 0xFFFFFFFF, 65535)
+    vehicle.write_sticks(sticks)
+    assert flight.read_sticks() == sticks
+    feedback = Feedback(*[float(number) for number in range(len(Feedback._fields))])
+    flight.write_feedback(feedback)
+    assert vehicle.read_feedback() == feedback
+    asked = [Request("aid", "attitude_retention", 2.0), Request("parameter", "XV_MC_BLEND_T_16", -0.5)]
+    assert all(vehicle.put_request(request) for request in asked)
+    assert flight.take_requests() == asked
+    assert flight.take_requests() == []
+    assert flight.put_text(4, "umlaut ä and " + "x" * 100)
+    ((severity, text),) = vehicle.take_texts()
+    assert severity == 4
+    assert text == ("umlaut ? and " + "x" * 100)[:50]
+
+
+def test_nan_angle_travels(pair):
+    pair[1].write_sticks(StickInput(sequence=1))
+    assert math.isnan(pair[0].read_sticks().nacelle_angle)
+
+
+def test_a_full_queue_refuses_and_goes_on(pair):
+    flight, vehicle = pair
+    taken = sum(vehicle.put_request(Request("aid", "x", float(number))) for number in range(300))
+    assert taken == 256
+    assert [request.value for request in flight.take_requests()] == [float(number) for number in range(256)]
+    assert vehicle.put_request(Request("reset"))
+    assert flight.take_requests() == [Request("reset")]
+
+
+WRITER = """
+import sys
+from rtsim.command import StickInput
+from telemetry.mavlink.exchange import STOP, Exchange
+exchange, number = Exchange(sys.argv[1]), 0
+while not exchange.header[STOP]:
+    number += 1
+    value = (number % 1000) / 1000.0
+    exchange.write_sticks(StickInput(sequence=number, stick=value, lever=value, lateral=value, yaw=value))
+exchange.close()
+"""
+
+
+def test_a_reader_never_sees_a_torn_value(pair):
+    flight = pair[0]
+    writer = subprocess.Popen([sys.executable, "-c", WRITER, flight.name], env=child_environment())
+    seen = set()
+    end = time.monotonic() + 20.0
+    while len(seen) < 5000 and time.monotonic() < end:
+        sticks = flight.read_sticks()
+        if sticks is not None:
+            assert sticks.stick == sticks.lever == sticks.lateral == sticks.yaw
+            seen.add(sticks.sequence)
+    flight.header[STOP] = 1
+    assert writer.wait(10.0) == 0
+    assert len(seen) >= 5000
+
+
+def test_attaching_to_nothing_or_something_else_is_refused():
+    with pytest.raises(InputError, match="no exchange of this name"):
+        Exchange("rtsim_there_is_none")
+
+
+def packed(message, *, system=255, key=None, link=0, stamp=None):
+    encoder = dialect.MAVLink(None, srcSystem=system, srcComponent=190)
+    if key is not None:
+        encoder.signing.secret_key, encoder.signing.link_id, encoder.signing.sign_outgoing = key, link, True
+        encoder.signing.timestamp = signature_time() if stamp is None else stamp
+    return message.pack(encoder)
+
+
+BEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+def test_frames_of_a_datagram_are_found_between_garbage():
+    first = packed(BEAT)
+    second = packed(dialect.MAVLink_manual_control_message(1, 1, 2, 3, 4, 5))
+    old = BEAT.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=1), force_mavlink1=True)
+    found = list(frames(first + b"\xfd\x00junk" + second + b"\xfe" + old + first[:15]))
+    assert [frame.message_id for frame in found] == [0, 69, 0]
+    assert [frame.raw for frame in found] == [first, second, old]
+    assert [frame.component_id for frame in found] == [190, 190, 1]
+
+
+@pytest.mark.parametrize("place", [1, 2, 4, 5, 7, 10, -1])
+def test_a_changed_byte_is_noticed(place):
+    data = bytearray(packed(BEAT))
+    data[place] ^= 0x55
+    assert list(frames(bytes(data))) == []
+
+
+def test_unknown_flags_and_unknown_messages_are_discarded():
+    data = bytearray(packed(BEAT))
+    data[2] = 0x02
+    assert list(frames(bytes(data))) == []
+
+
+def test_work_per_datagram_is_bounded():
+    assert len(list(frames(packed(BEAT) * 200))) <= 128
+    assert list(frames(b"\xfd" * 2048)) == []
+
+
+@given(st.binary(max_size=600))
+def test_no_bytes_raise(data):
+    list(frames(data))
+
+
+def one(data):
+    (frame,) = frames(data)
+    return frame
+
+
+def test_signatures_are_checked():
+    check = SignatureCheck(KEY)
+    assert not check.accepts(one(packed(BEAT)))
+    now = signature_time()
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=now)))
+    assert not check.accepts(one(packed(BEAT, key=KEY, stamp=now)))  # played again
+    assert not check.accepts(one(packed(BEAT, key=KEY, stamp=now - 1)))
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=now + 1)))
+    assert not check.accepts(one(packed(BEAT, key=bytes(32), stamp=now + 2)))
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=now + 2)))  # a wrong key does not move the stream's time
+    assert not check.accepts(one(packed(BEAT, key=KEY, link=3, stamp=now - 61 * 100_000)))
+    assert check.accepts(one(packed(BEAT, key=KEY, link=3, stamp=now - 59 * 100_000)))
+    radio = dialect.MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1)
+    assert check.accepts(one(packed(radio)))
+    old = BEAT.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=1), force_mavlink1=True)
+    assert not check.accepts(one(old))
+
+
+def test_signing_keys_are_read_from_private_files(tmp_path):
+    file = tmp_path / "key"
+    file.write_text(KEY.hex() + "\n")
+    with pytest.raises(InputError, match="chmod 600"):
+        read_signing_key(file)
+    file.chmod(0o600)
+    assert read_signing_key(file) == KEY
+    file.write_bytes(KEY)
+    assert read_signing_key(file) == KEY
+    file.write_text("too short")
+    with pytest.raises(InputError, match="64 hexadecimal"):
+        read_signing_key(file)
+    with pytest.raises(InputError, match="cannot be read"):
+        read_signing_key(tmp_path / "none")
+
+
+def test_addresses():
+    assert Endpoint.parse("127.0.0.1:14551") == Endpoint("127.0.0.1", 14551)
+    assert Endpoint.parse("localhost") == Endpoint("127.0.0.1", 14550)
+    for wrong in ("", "127.0.0.1:0", "127.0.0.1:70000", ":14550", "127.0.0.1:x", "no such host:1"):
+        with pytest.raises(InputError, match="--mavlink"):
+            Endpoint.parse(wrong)
+
+
+def test_leaving_this_machine_needs_permission():
+    targets, host, port, warning = endpoints([], allow_network=False)
+    assert (targets, host, port, warning) == ((Endpoint("127.0.0.1", 14550),), "127.0.0.1", 0, None)
+    for options in ({"targets": ["192.0.2.1:14550"]}, {"targets": [], "bind": "0.0.0.0:14560"}):
+        with pytest.raises(InputError, match="--mavlink-network"):
+            endpoints(**options, allow_network=False)
+        *_, host, _, warning = endpoints(**options, allow_network=True)
+        assert host == "0.0.0.0"
+        assert "anyone" in warning
+
+
+def test_settings_survive_the_way_to_the_process():
+    config = MavlinkConfig(
+        targets=(Endpoint("127.0.0.1", 1), Endpoint("127.0.0.1", 2)),
+        aids={"rate_damping": True},
+        parameters={"XV_NAC_RATE": 2.0},
+        axes={"stick": "-r"},
+        buttons={"pilot": 3},
+        home=HomePosition(heading_deg=12.0),
+        whitelist=(255,),
+    )
+    assert MavlinkConfig.from_json(config.to_json()) == config
+
+
+def test_parameters_are_declared_well():
+    names = [parameter.name for parameter in PARAMETERS] + [name for name, _ in AID_PARAMETERS.values()]
+    assert len(set(names)) == len(names)
+    assert max(map(len, names)) <= 16
+    for parameter in PARAMETERS:
+        assert parameter.low <= parameter.default <= parameter.high
+        assert parameter.description.endswith(".")
+
+
+def test_wrong_start_values_are_refused():
+    with pytest.raises(InputError, match=r"XV_NAC_RATE.*0\.5 to 7\.5"):
+        ParameterStore({}, {"XV_NAC_RATE": 100.0})
+    with pytest.raises(InputError, match="XV_NONE"):
+        ParameterStore({}, {"XV_NONE": 1.0})
+
+
+def test_wrong_maps_are_refused():
+    with pytest.raises(InputError, match=r"axes\.stick"):
+        StickReader({"stick": "w"}, {})
+    with pytest.raises(InputError, match=r"axes\.rudder"):
+        StickReader({"rudder": "x"}, {})
+    with pytest.raises(InputError, match=r"buttons\.fire"):
+        StickReader({}, {"fire": 1})
+
+
+@given(st.lists(st.floats(0.0, 0.1), min_size=1, max_size=100))
+def test_a_bucket_never_gives_more_than_its_rate(steps):
+    bucket, now, given_out = TokenBucket(100.0, 10.0, 0.0), 0.0, 0
+    for step in steps:
+        now += step
+        for _ in range(20):
+            given_out += bucket.take(now)
+    assert given_out <= 10.0 + 100.0 * now + 1.0
+
+
+def test_schedules_stay_on_their_grid_and_make_up_for_nothing():
+    schedule = StreamSchedule(0.0, fastest_hz=250.0)
+    moments = [now for now in (place * 0.001 for place in range(5000)) if 30 in schedule.take_due(now)]
+    assert len(moments) == 250
+    assert all(abs(moment - round(moment / 0.02) * 0.02) < 0.0011 for moment in moments)
+    schedule.take_due(60.0)
+    assert schedule.take_due(60.0) == []
+    assert schedule.next_due > 60.0
