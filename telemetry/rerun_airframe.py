@@ -190,19 +190,17 @@ def blades(direction: float) -> Mesh:
     return merge(parts)
 
 
-def disc(colour: Colour, opacity: int) -> Mesh:
-    """A rotor disc in the hub frame, fading towards the hub.
+def disc(colour: Colour) -> Mesh:
+    """A rotor disc in the hub frame.
 
     Args:
         colour: Its colour.
-        opacity: Opacity at the rim, 0 to 255.
     """
     rim = circle(96)[:-1]
     vertices = np.concatenate([np.zeros((1, 3)), rim])
     around = np.arange(1, len(rim) + 1)
     triangles = np.stack([np.zeros(len(rim), dtype=int), around, np.roll(around, -1)], 1)
-    colours = np.tile(np.array([*colour, opacity], dtype=np.uint8), (len(vertices), 1))
-    colours[0, 3] = opacity // 3
+    colours = np.tile(np.array([*colour, 255], dtype=np.uint8), (len(vertices), 1))
     normals = np.tile([1.0, 0.0, 0.0], (len(vertices), 1))
     return Mesh(vertices, triangles.astype(np.uint32), normals, colours)
 

@@ -113,20 +113,9 @@ class Plots:
             self._states[name] = state
             set_row_time(self._recording, row)
             self._recording.log(f"events/{name}", rr.StateChange(state=state))
-            if name == "corridor":
-                self._log_level(row, before)
-            elif before is not None:
-                self.event(f"{name.capitalize()}: {state.lower()}", "info")
-
-    def _log_level(self, row: FloatArray, before: str | None) -> None:
-        """A line for the event log whenever the corridor level changes."""
-        level = level_of(row)
-        if before is None and level == 0:
-            return
-        side = "low" if row[COLUMN.margin_low_kt] <= row[COLUMN.margin_high_kt] else "high"
-        words = "clear again" if level == 0 else LEVEL_NAMES[level].lower()
-        text = f"Corridor {words}: {row[COLUMN.margin_kt]:+.1f} kn to the {side}-speed side"
-        self.event(text, ("info", "caution", "warning", "exceedance")[level])
+            if name == "mode" and before is not None:
+                # The other two are events of the flight itself, which tells them with its own words.
+                self.event(f"Mode: {state.lower()}", "info")
 
 
 def set_row_time(recording: Any, row: FloatArray) -> None:

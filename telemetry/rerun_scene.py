@@ -16,6 +16,8 @@ SHOWN_TURNS_PER_SECOND = 0.45
 """Blades are shown this slowly: at 30 pictures a second 589 rpm would look like noise."""
 TRAIL_POINTS = 400
 """Longest path shown, in points half a second apart."""
+DISC_OPACITY = 70
+"""Opacity of the rotor discs, 0 to 255."""
 GROUND_STEP = 50.0
 """Spacing of the ground's grid [m]."""
 SIDES = (("left", -1.0, LEFT_ROTOR), ("right", 1.0, RIGHT_ROTOR))
@@ -45,11 +47,12 @@ class Scene:
             self._log_static_rotor(f"world/aircraft/nacelle_{name}", side, colour)
         self._log_ground()
 
-    def update(self, row: FloatArray) -> None:
+    def update(self, row: FloatArray, *, trail: bool = True) -> None:
         """Show the aircraft as it is in one row.
 
         Args:
             row: A frame's signals.
+            trail: The place is part of the path.
         """
         time_s, nacelle = float(row[COLUMN.time_s]), math.radians(row[COLUMN.nacelle_deg])
         position = [float(row[COLUMN.distance_m]), 0.0, -float(row[COLUMN.altitude_m])]
@@ -74,14 +77,14 @@ class Scene:
         self._log(
             "world/height", rr.LineStrips3D([[position, [position[0], 0.0, 0.0]]], colors=[(*CYAN, 90)], radii=[-0.7])
         )
-        if time_s - self._trail_time >= 0.5:
+        if trail and time_s - self._trail_time >= 0.5:
             self._trail_time = time_s
             self._trail = [*self._trail[1 - TRAIL_POINTS :], position]
             self._log("world/trail", rr.LineStrips3D([self._trail], colors=[TRAIL], radii=[-1.5]))
 
     def _log_static_rotor(self, path: str, side: float, colour: airframe.Colour) -> None:
         self._static(f"{path}/pod", _mesh(airframe.nacelle()))
-        self._static(f"{path}/hub/disc", _mesh(airframe.disc(colour, 34)))
+        self._static(f"{path}/hub/disc", _glass(airframe.disc(colour), DISC_OPACITY))
         self._static(f"{path}/hub/rim", rr.LineStrips3D([airframe.circle(96)], colors=[colour], radii=[0.035]))
         self._static(f"{path}/hub/blades", _mesh(airframe.blades(side)))
         # A thin ring square to the mast: the distance of the rim from it is the flapping.
@@ -128,6 +131,17 @@ def _mesh(mesh: airframe.Mesh) -> Any:
         triangle_indices=mesh.triangles,
         vertex_normals=mesh.normals.astype(np.float32),
         vertex_colors=mesh.colours,
+    )
+
+
+def _glass(mesh: airframe.Mesh, opacity: int) -> Any:
+    """A mesh to look through; the viewer heeds opacity in the albedo only, not in vertex colours."""
+    red, green, blue, _ = (int(value) for value in mesh.colours[0])
+    return rr.Mesh3D(
+        vertex_positions=mesh.vertices.astype(np.float32),
+        triangle_indices=mesh.triangles,
+        vertex_normals=mesh.normals.astype(np.float32),
+        albedo_factor=(red, green, blue, opacity),
     )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from telemetry.corridor_outline import CorridorOutline
 from telemetry.rerun_blueprint import blueprint
 from telemetry.rerun_corridor import CorridorPlot
@@ -145,6 +145,11 @@ class Streamer:
         self._instruments = Instruments(recording)
         self._plots = Plots(recording)
         recording.send_blueprint(blueprint(self._options.layout))
+        # What is seen until the first row comes, which overwrites it: a helicopter at rest.
+        waiting = np.zeros(SIGNAL_COUNT)
+        waiting[COLUMN.nacelle_deg], waiting[COLUMN.altitude_m] = 90.0, 100.0
+        self._scene.update(waiting, trail=False)
+        self._instruments.update(waiting)
         self._last_time = -math.inf
 
     def _draw(self, row: FloatArray) -> None:

@@ -65,38 +65,44 @@ class Worker:
     def run(self) -> None:
         """Show rows until told to close, or until the flight's process is gone."""
         period = 1.0 / self._options.pictures_per_second
-        while self._take_orders():
+        open_end = True
+        while open_end:
             started = time.monotonic()
+            # Orders are received before the rows are and followed after: an event stands behind the rows it follows.
+            open_end = self._receive_orders()
             rows = self._reader.read()
             if len(rows):
                 self._streamer.take(rows)
+            if self._follow_orders():
+                break
             if started >= self._next_check:
                 self._next_check = started + 0.5
                 self._check()
             time.sleep(max(0.001, started + period - time.monotonic()))
-        rows = self._reader.read()
-        if len(rows):
-            self._streamer.take(rows)
         watched = self._viewer is not None and self._viewer.ended() is None
         self._streamer.close(linger_s=0.4 if watched else 0.0)
         if self._viewer is not None and self._options.close_viewer:
             self._viewer.close()
 
-    def _take_orders(self) -> bool:
-        """Read stdin as far as it goes; False once there is nothing more to do."""
+    def _receive_orders(self) -> bool:
+        """Read stdin as far as it goes; False once its other end is closed."""
         while select.select([0], [], [], 0.0)[0]:
             received = os.read(0, 1 << 16)
             if not received:
                 return False
             self._orders += received
+        return True
+
+    def _follow_orders(self) -> bool:
+        """Do what was received; True once that includes closing."""
         while b"\n" in self._orders:
             line, self._orders = self._orders.split(b"\n", 1)
             order = json.loads(line)
             if "event" in order:
                 self._streamer.event(order["event"], order["level"])
             if order.get("close"):
-                return False
-        return True
+                return True
+        return False
 
     def _start_viewer(self, url: str) -> None:
         try:

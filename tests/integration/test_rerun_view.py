@@ -103,6 +103,8 @@ def test_a_recording_holds_the_flight(tmp_path: Path, told: list[str]) -> None:
         assert view.wait_ready(30.0)
         view.event("flight begins", "info")
         fly(view, rows)
+        time.sleep(0.2)
+        view.event("too close", "warning")
         start = time.monotonic()
         view.close()
         assert time.monotonic() - start < 3.0
@@ -113,12 +115,15 @@ def test_a_recording_holds_the_flight(tmp_path: Path, told: list[str]) -> None:
     speeds = [row[0] for row in values(record, "/plots/speed/kn", "Scalars:scalars")]
     assert speeds == rows[::5, COLUMN.airspeed_kt].tolist(), "50 points of a curve per second, exact"
     text = [entry[0] for entry in values(record, "/events/log", "TextLog:text")]
-    assert "flight begins" in text
-    assert "Corridor warning: +3.0 kn to the low-speed side" in text
+    assert text == ["flight begins", "Mode: conversion", "Mode: airplane", "too close"]
+    levels = [entry[0] for entry in values(record, "/events/log", "TextLog:level")]
+    assert levels == ["INFO", "INFO", "INFO", "ERROR"]
+    corridor = [entry[0] for entry in values(record, "/events/corridor", "StateChange:state")]
+    assert corridor == ["CLEAR", "WARNING"]
     modes = [entry[0] for entry in values(record, "/events/mode", "StateChange:state")]
     assert modes == ["HELICOPTER", "CONVERSION", "AIRPLANE"]
     nacelle = values(record, "/world/aircraft/nacelle_left", "Transform3D:quaternion")
-    assert nacelle[0][0] == pytest.approx([0.0, np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)], abs=1e-6)
+    assert nacelle[1][0] == pytest.approx([0.0, np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)], abs=1e-6)
     assert nacelle[-1][0][3] == pytest.approx(1.0, abs=1e-3), "airplane mode at the end"
     assert len(nacelle) > 40
     assert list(rr.chunk.RrdReader(str(record)).blueprints()), "the layout is in the file"
