@@ -234,12 +234,12 @@ def test_speed_of_minimum_power_in_airplane_mode_documented_mismatch():
     assert speeds[int(np.argmin(powers))] == pytest.approx(116.0, abs=2.0)
 
 
-def boundary(nacelle, *, alpha_limit=16.0):
-    """Lowest airspeed [kn] reached from the fast side with the wing below its stall angle, flaps 40."""
+def boundary(nacelle, *, alpha_limit=16.0, flap_deg=40.0):
+    """Lowest airspeed [kn] reached from the fast side with the wing below an angle of attack."""
     last = None
     for speed in np.arange(125.0, 45.0, -1.0):
         point = AIRCRAFT.trim(
-            Condition(airspeed=kt(float(speed)), nacelle_angle=deg(nacelle), flap=deg(40.0)), guess=last
+            Condition(airspeed=kt(float(speed)), nacelle_angle=deg(nacelle), flap=deg(flap_deg)), guess=last
         )
         jumped = last is not None and abs(point.x[STATE.pitch] - last.x[STATE.pitch]) > deg(3.0)
         if not point.converged or jumped or to_deg(point.y[OUTPUT.wing_angle_of_attack]) > alpha_limit:
@@ -269,6 +269,29 @@ def test_low_speed_boundary_documented_mismatch(nacelle, offset):
     assert found - CORRIDOR["low_kn"][k] == pytest.approx(offset, abs=2.0)
     flown = DATA["corridor"]["flight_power_on_stall"]
     assert found < np.interp(-nacelle, -np.array(flown["nacelle_deg"]), flown["speed_kn"])
+
+
+STATIC = DATA["corridor"]["wang2025_static"]
+
+
+@pytest.mark.parametrize(("nacelle", "flap_deg"), [(0.0, 0.0), (30.0, 20.0)])
+def test_low_speed_boundary_of_another_model(nacelle, flap_deg):
+    """Computed stall boundary within 5 kn (our band), at the flap settings of its source. Wang 2025 fig 15a."""
+    k = STATIC["nacelle_deg"].index(nacelle)
+    assert abs(boundary(nacelle, flap_deg=flap_deg) - STATIC["low_kn"][k]) <= 5.0
+
+
+def test_low_speed_boundary_of_another_model_documented_mismatch():
+    """Documented mismatch: at nacelle 60, flaps 20, the wing reaches 16 deg at 59 kn; Wang 2025 fig 15a prints 70."""
+    assert boundary(60.0, flap_deg=20.0) == pytest.approx(59.0, abs=2.0)
+
+
+@pytest.mark.parametrize("nacelle", [65.0, 49.2, 31.0])
+def test_flown_line_of_six_degrees(nacelle):
+    """Level-flight minimum (alpha = 6 deg) within 5 kn (our band), flaps 20 assumed. Source: TM-81244 fig 14."""
+    flown = DATA["corridor"]["flight_vmin_alpha6"]
+    expected = flown["speed_kn"][flown["nacelle_deg"].index(nacelle)]
+    assert abs(boundary(nacelle, alpha_limit=6.0, flap_deg=20.0) - expected) <= 5.0
 
 
 SPEEDS = DATA["speeds"]
