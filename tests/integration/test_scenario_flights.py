@@ -14,7 +14,7 @@ import pytest
 
 import scenarios
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
+from rtsim.frame import COLUMN, FloatArray
 from rtsim.realtime import FlightControl
 from rtsim.units import deg, kt
 from scenarios.options import Overrides, chosen_scenario
@@ -54,11 +54,11 @@ def test_one_flight_in_many_guises_has_one_history(tmp_path: Path) -> None:
     control.pause()
     control.step(20)
 
-    def touch() -> None:
-        threading.Timer(0.3, control.set_speed, (5.0,)).start()
-        threading.Timer(0.4, control.resume).start()
+    def resume_warped(row: FloatArray) -> None:
+        if row[COLUMN.frame] == 19.0:
+            threading.Timer(0.3, lambda: (control.set_speed(5.0), control.resume())).start()
 
-    outputs = FlightOutputs(log=tmp_path / "a.parquet", on_start=touch)
+    outputs = FlightOutputs(log=tmp_path / "a.parquet", on_rows=resume_warped)
     touched = scenarios.fly("typical_conversion", overrides=short, control=control, outputs=outputs)
     warped = scenarios.fly("typical_conversion", speed=20.0, overrides=short)
     assert touched.timing.paused_s > 0.1

@@ -7,6 +7,7 @@ import math
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -16,6 +17,14 @@ from rtsim.frame import TIMING_SIGNALS
 from rtsim.realtime import Executive, FlightControl, OverrunPolicy
 from rtsim.realtime.control import WARP_STEPS, neighbouring_warp
 from rtsim.realtime.executive import loop_conditions
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait until something is so, at most ten seconds."""
+    end = time.monotonic() + 10.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.002)
+
 
 TIMING = {signal.name: number for number, signal in enumerate(TIMING_SIGNALS)}
 
@@ -70,30 +79,35 @@ def test_the_stop_policy_ends_the_flight_at_the_nth_overrun(make_source: Any, si
 
 def test_pause_costs_no_drift_and_no_frame(make_source: Any, sink: Any) -> None:
     control = FlightControl()
-    source = make_source(60, at={30: control.pause})
-    threading.Timer(0.35, control.resume).start()
-    report = Executive(source, sink, control=control).fly()
+
+    def pause_for_a_second() -> None:
+        control.pause()
+        threading.Timer(1.0, control.resume).start()
+
+    report = Executive(make_source(60, at={30: pause_for_a_second}), sink, control=control).fly()
     assert sink.frames == list(range(60))
-    assert report.paused_s > 0.1
+    assert report.paused_s > 0.9
     assert report.drift_frames is not None
-    assert report.drift_frames < 5.0  # a pause of 0.2 s would be 50 frames
-    assert report.real_time_factor == pytest.approx(1.0, abs=0.2)
+    assert report.drift_frames < 100.0  # counted as lateness, the pause would be 250 frames
+    assert report.real_time_factor > 0.5  # counted as flying, it would leave 0.2
 
 
 def test_single_steps_while_paused(make_source: Any, sink: Any) -> None:
     control = FlightControl()
     flown: list[int] = []
 
+    def look_and(act: Callable[[], object]) -> None:
+        wait_for(lambda: control.paused and not control.requests)
+        time.sleep(0.05)
+        flown.append(len(sink.rows))
+        act()
+
     def script() -> None:
-        time.sleep(0.1)
-        flown.append(len(sink.rows))
-        control.step()
-        time.sleep(0.1)
-        flown.append(len(sink.rows))
-        control.step(10)
-        time.sleep(0.2)
-        flown.append(len(sink.rows))
-        control.stop("done looking")
+        look_and(control.step)
+        wait_for(lambda: len(sink.rows) == 1)
+        look_and(lambda: control.step(10))
+        wait_for(lambda: len(sink.rows) == 11)
+        look_and(lambda: control.stop("done looking"))
 
     control.pause()
     thread = threading.Thread(target=script)
@@ -107,9 +121,10 @@ def test_single_steps_while_paused(make_source: Any, sink: Any) -> None:
 def test_steps_also_pause_an_unpaced_flight(make_source: Any, sink: Any) -> None:
     control = FlightControl()
     control.step(40)
-    threading.Timer(0.2, control.stop).start()
-    report = Executive(make_source(1000), sink, control=control, speed=math.inf).fly()
+    source = make_source(1000, at={39: threading.Timer(0.2, control.stop).start})
+    report = Executive(source, sink, control=control, speed=math.inf).fly()
     assert report.frames == 40
+    assert report.paused_s > 0.1
 
 
 def test_warp_changes_while_flying(make_source: Any, sink: Any) -> None:
@@ -117,7 +132,7 @@ def test_warp_changes_while_flying(make_source: Any, sink: Any) -> None:
     source = make_source(500, at={50: lambda: control.set_speed(10.0), 300: lambda: control.set_speed(math.inf)})
     report = Executive(source, sink, control=control).fly()
     assert sink.frames == list(range(500))
-    assert 0.29 < report.wall_s < 1.0  # 50 frames of 4 ms, 250 of 0.4 ms, 200 at once
+    assert 0.29 < report.wall_s < 1.9  # 50 frames of 4 ms, 250 of 0.4 ms, 200 at once; 2 s without warp
     assert control.speed == math.inf
 
 
