@@ -1,15 +1,14 @@
 """The pilot as a linear system over one held frame: rates of estimate, hands and delay, and the limits of the hands.
 
-Legend: x estimate [plant | delay | hands] (padded), u true hands before the delay, d true delay filter; A B C F l G2 as in
-the design. Matrices are stored column after column, so that each multiply-add runs down contiguous memory.
+Legend: x estimate [plant | delay | hands] (padded), u true hands before the delay, d true delay filter; A B C F l G2 as
+in the design. Matrices are stored column after column, so that each multiply-add runs down contiguous memory.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
-
+from rtsim.compiled import inner_kernel
 from rtsim.pilot.layout_kernels import (
     INTEGRALS,
     R_A,
@@ -71,7 +70,7 @@ class Motion(NamedTuple):
     """Delay filter (nd,)."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
     """Look at an interpolated cell as matrices.
 
@@ -101,7 +100,7 @@ def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def rates(
     tables: PilotTables, gains: Gains, held: Held, at: Motion, frozen: bool, out: Motion, scratch: FloatArray
 ) -> None:
@@ -183,7 +182,7 @@ def rates(
             dx[k] += column[k] * value
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def limit_hands(tables: PilotTables, gains: Gains, held: Held, at: Motion, trim: FloatArray) -> bool:
     """Limit rate and travel of the hands at the start of a frame.
 
@@ -217,7 +216,7 @@ def limit_hands(tables: PilotTables, gains: Gains, held: Held, at: Motion, trim:
     return limited
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def motion_of(tables: PilotTables, work: FloatArray) -> Motion:
     """Look at an array as estimate, hands and delay filter.
 
@@ -235,7 +234,7 @@ def motion_of(tables: PilotTables, work: FloatArray) -> Motion:
     return Motion(work[:wide], work[wide : wide + hands], work[wide + hands : wide + hands + delay])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def motion_size(tables: PilotTables) -> int:
     """Length of an array for `motion_of`.
 
@@ -246,10 +245,10 @@ def motion_size(tables: PilotTables) -> int:
         The number of float64 values.
     """
     roles = tables.roles
-    return pad4(roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]) + roles[R_HANDS] + roles[R_DELAY]
+    return int(pad4(roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]) + roles[R_HANDS] + roles[R_DELAY])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def held_of(tables: PilotTables, work: FloatArray) -> Held:
     """Look at an array as what acts constantly during a frame.
 
@@ -272,7 +271,7 @@ def held_of(tables: PilotTables, work: FloatArray) -> Held:
     )
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def held_size(tables: PilotTables) -> int:
     """Length of an array for `held_of`.
 
@@ -282,4 +281,4 @@ def held_size(tables: PilotTables) -> int:
     Returns:
         The number of float64 values.
     """
-    return pad4(tables.roles[R_PLANT]) + pad4(tables.roles[R_DISPLAYS]) + 3 * tables.roles[R_HANDS]
+    return int(pad4(tables.roles[R_PLANT]) + pad4(tables.roles[R_DISPLAYS]) + 3 * tables.roles[R_HANDS])

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from rtsim.compiled import kernel
 from rtsim.pilot.layout_kernels import (
     INTEGRALS,
     LOOP_INTEGRATORS,
@@ -41,21 +41,21 @@ from rtsim.pilot.layout_kernels import (
 )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def mocm_engage(
     tables: PilotTables,
     state: FloatArray,
     x: FloatArray,
     nacelle_angle: float,
-    nacelle_rate: float,
+    nacelle_rate: float,  # noqa: ARG001 - one signature for all three kernels
     reference: FloatArray,
     present: FloatArray,
 ) -> None:
     """Let the pilot take over without a step: its first output is the present stick and lever.
 
     The pilot's own reference starts at the present airspeed, altitude and climb rate and leads from there to what is
-    asked for. The estimate starts at the true deviations, without gusts. The integrals are set so that the present controls are
-    also what the pilot wants, as far as their limits allow; from there it steers to the reference.
+    asked for. The estimate starts at the true deviations, without gusts. The integrals are set so that the present
+    controls are also what the pilot wants, as far as their limits allow.
 
     Args:
         tables: Prepared pilot.
@@ -108,7 +108,7 @@ def mocm_engage(
     _start_integrals(tables, cell, state, trim, own[REF_AIRSPEED], errors)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at: int, delay_at: int) -> None:
     """Put a delay filter at rest at the present hands: a x_d = -b u_p, by elimination."""
     delay = tables.roles[R_DELAY]
@@ -136,7 +136,7 @@ def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at:
         state[delay_at + k] = matrix[k, delay] / matrix[k, k]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _start_integrals(
     tables: PilotTables, cell: FloatArray, state: FloatArray, trim: FloatArray, airspeed: float, errors: FloatArray
 ) -> None:

@@ -77,7 +77,7 @@ class FrozenLoop:
         z = np.exp(1j * np.asarray(frequencies) * self.dt)[:, None, None]
         plant = np.linalg.solve(z * np.eye(self.plant_a.shape[0]) - self.plant_a, self.plant_b.astype(np.complex128))
         pilot = np.linalg.solve(z * np.eye(self.pilot_a.shape[0]) - self.pilot_a, self.pilot_b @ plant)
-        return one_at_a_time(-(self.pilot_c @ pilot))
+        return one_at_a_time(np.asarray(-(self.pilot_c @ pilot), dtype=np.complex128))
 
     def margins(self) -> Margins:
         """Crossover, phase and gain margin of each control."""

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from rtsim.compiled import inner_kernel
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -69,7 +70,7 @@ N_COUNT = 11
 SAME_CONTROL = 1e-9
 """Applied and demanded controls closer than this are the same (rounding must not freeze the integrals)."""
 CAPTURE_FREQUENCY = 0.4
-"""After taking over, the pilot leads its own reference from where the aircraft is to what is asked, at this rate [rad/s]."""
+"""After taking over, the pilot leads its own reference from where the aircraft is to what is asked [rad/s]."""
 CAPTURE_AIRSPEED_RATE = 1.5
 """Fastest capture of an airspeed [m/s^2]."""
 CAPTURE_CLIMB = 4.0
@@ -102,7 +103,7 @@ class PilotTables(NamedTuple):
     nacelle: FloatArray
     """Nacelle axis (N,) [rad]."""
     trim: FloatArray
-    """[pitch, hands] of the level trim; coefficients of acceleration, of its square; slopes with airspeed (V, N, ...)."""
+    """[pitch, hands] of the level trim; coefficients of acceleration, its square; slopes with airspeed (V, N, k)."""
     cells: FloatArray
     """Design plant and gains of each grid point, flattened by columns (V, N, block)."""
     a_columns: IntArray
@@ -131,7 +132,7 @@ class PilotTables(NamedTuple):
     """Loop, sizes, positions of aircraft states and of the sections of a cell (``R_*``)."""
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def pad4(count: int) -> int:
     """Round up to a multiple of four, the width of a vector register.
 
@@ -144,7 +145,7 @@ def pad4(count: int) -> int:
     return 4 * ((count + 3) // 4)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def pilot_state_size(tables: PilotTables) -> int:
     """Length of the pilot's state array.
 
@@ -156,10 +157,10 @@ def pilot_state_size(tables: PilotTables) -> int:
     """
     roles = tables.roles
     estimate = roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]
-    return S_ESTIMATE + estimate + roles[R_HANDS] + roles[R_DELAY] + INTEGRALS + roles[R_PLANT] + OFFSETS
+    return int(S_ESTIMATE + estimate + roles[R_HANDS] + roles[R_DELAY] + INTEGRALS + roles[R_PLANT] + OFFSETS)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def noise_width(tables: PilotTables) -> int:
     """Standard normals the pilot takes per frame when its noise is on: one per display and hand.
 
@@ -169,15 +170,21 @@ def noise_width(tables: PilotTables) -> int:
     Returns:
         The number.
     """
-    return tables.roles[R_DISPLAYS] + tables.roles[R_HANDS]
+    return int(tables.roles[R_DISPLAYS] + tables.roles[R_HANDS])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def clip(value: float, limit: float) -> float:
+    """Keep a value within plus and minus a limit.
+
+    Args:
+        value: The value.
+        limit: The limit.
+    """
     return min(limit, max(-limit, value))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def _cell_below(axis: FloatArray, value: float) -> int:
     low = 0
     high = axis.shape[0] - 1
@@ -190,15 +197,19 @@ def _cell_below(axis: FloatArray, value: float) -> int:
     return low
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def interpolate(
     tables: PilotTables, cells: FloatArray, airspeed: float, nacelle_angle: float, last: int, out: FloatArray
 ) -> None:
-    """Keep a value within plus and minus a limit.
+    """Interpolate the first entries of the cells around a point, clamped to the grid.
 
     Args:
-        value: The value.
-        limit: The limit.
+        tables: Prepared pilot, for its axes.
+        cells: Its cells, gains or trims.
+        airspeed: Airspeed of the point [m/s].
+        nacelle_angle: Nacelle angle of the point [rad].
+        last: How many entries.
+        out: Receives them.
     """
     i = _cell_below(tables.airspeed, airspeed)
     j = _cell_below(tables.nacelle, nacelle_angle)
@@ -214,7 +225,7 @@ def interpolate(
         out[k] = w0 * cells[i, j, k] + w1 * cells[i, j + 1, k] + w2 * cells[i + 1, j, k] + w3 * cells[i + 1, j + 1, k]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: float, out: FloatArray) -> None:
     """Pitch and hands of the commanded trim.
 
@@ -237,7 +248,7 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
     out[0] += reference[REF_CLIMB] * speed / (speed * speed + climb_speed * climb_speed)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def own_reference(state: FloatArray, reference: FloatArray, out: FloatArray) -> None:
     """Write what is asked for plus the offset of a capture in progress (zero in ordinary flight).
 
@@ -251,7 +262,7 @@ def own_reference(state: FloatArray, reference: FloatArray, out: FloatArray) -> 
         out[k] = reference[k] + state[first + k]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def observe(
     tables: PilotTables, x: FloatArray, reference: FloatArray, pitch: float, pitch_rate: float, out: FloatArray
 ) -> float:
@@ -279,10 +290,10 @@ def observe(
     out[2] = u * sine - w * cosine - reference[REF_CLIMB]
     out[3] = x[roles[R_PITCH]] - pitch
     out[4] = x[roles[R_Q]] - pitch_rate
-    return airspeed
+    return float(airspeed)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def plant_reference(
     tables: PilotTables, reference: FloatArray, trim: FloatArray, pitch_rate: float, out: FloatArray
 ) -> None:
@@ -310,7 +321,7 @@ def plant_reference(
             out[tables.lags[hand]] = trim[1 + hand]
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def outer_command(
     tables: PilotTables, cell: FloatArray, trim: FloatArray, airspeed: float, dv: float, dh: float, hand: int
 ) -> float:
@@ -344,10 +355,10 @@ def outer_command(
     for other in range(hands):
         if tables.lags[other] >= 0:
             along += cell[place + hands * tables.lags[other]] * trim[slopes + 1 + other]
-    return along * dv + cell[place + 4 * hands] * dh
+    return float(along * dv + cell[place + 4 * hands] * dh)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def demand(tables: PilotTables, state: FloatArray, hand: int) -> float:
     """Deviation of a hand's control after the true delay.
 
@@ -363,4 +374,4 @@ def demand(tables: PilotTables, state: FloatArray, hand: int) -> float:
     total = tables.delay_d[hand] * state[hands_at + hand]
     for k in range(delay):
         total += tables.output_delay_c[hand, k] * state[delay_at + k]
-    return total
+    return float(total)

@@ -1,11 +1,12 @@
 """The scheduled pilot on line: one frame of the MOCM, compiled.
 
-One frame is two calls, so that protection can sit between them: ``mocm_output`` gives stick and lever for the frame that
-starts, ``mocm_advance`` then moves the pilot to the next frame, knowing the controls that were really applied.
+One frame is two calls, so that protection can sit between them: ``mocm_output`` gives stick and lever for the frame
+that starts, ``mocm_advance`` then moves the pilot to the next frame, knowing the controls that were really applied.
 ``mocm_engage`` sets the pilot's state when it takes over.
 
 ``reference`` is what the pilot is asked for: ``[airspeed, airspeed rate, altitude, climb rate, nacelle command rate]``
-(m/s, m/s^2, m, m/s, rad/s). Trim and feed-forward follow the *commanded* airspeed and acceleration and the nacelle angle.
+(m/s, m/s^2, m, m/s, rad/s). Trim and feed-forward follow the *commanded* airspeed and acceleration and the nacelle
+angle.
 The equations stand in docs/pilot.md; sums have a fixed order and no library routine is called.
 """
 
@@ -14,8 +15,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from rtsim.compiled import inner_kernel, kernel
 from rtsim.pilot.dynamics_kernels import (
     Held,
     gains_of,
@@ -75,15 +76,15 @@ from rtsim.pilot.layout_kernels import (
 __all__ = ["PilotTables", "mocm_advance", "mocm_engage", "mocm_output", "noise_width", "pilot_state_size"]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def mocm_output(
     tables: PilotTables,
     state: FloatArray,
-    x: FloatArray,
+    x: FloatArray,  # noqa: ARG001 - one signature for the kernels of the frame
     nacelle_angle: float,
-    nacelle_rate: float,
+    nacelle_rate: float,  # noqa: ARG001
     reference: FloatArray,
-    noise: FloatArray,
+    noise: FloatArray,  # noqa: ARG001
     out: FloatArray,
 ) -> None:
     """Stick and lever for the frame that starts now; changes no state.
@@ -105,7 +106,7 @@ def mocm_output(
     _output(tables, state, nacelle_angle, reference, out, work)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def _output(
     tables: PilotTables,
     state: FloatArray,
@@ -122,7 +123,7 @@ def _output(
         out[hand] = min(tables.limits[1, hand], max(tables.limits[0, hand], value))
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def _capture(state: FloatArray, place: int, limits: tuple[float, float], dt: float) -> None:
     """Lead one offset and its rate to zero: critically damped, its speed and acceleration limited."""
     speed, acceleration = limits
@@ -133,7 +134,7 @@ def _capture(state: FloatArray, place: int, limits: tuple[float, float], dt: flo
     state[place + 1] += dt * change
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def _known_accelerations(
     tables: PilotTables,
     cell: FloatArray,
@@ -156,7 +157,7 @@ def _known_accelerations(
     held.plant[1] += own[REF_AIRSPEED_RATE] * math.sin(trim[0])
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def _outer_loops(
     tables: PilotTables, cell: FloatArray, held: Held, trim: FloatArray, own: FloatArray, integrals: FloatArray
 ) -> None:
@@ -173,7 +174,7 @@ def _outer_loops(
         held.command[hand] = outer_command(tables, cell, trim, own[REF_AIRSPEED], dv, dh, hand)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def mocm_advance(
     tables: PilotTables,
     state: FloatArray,
@@ -205,7 +206,7 @@ def mocm_advance(
     _advance(tables, state, x, (nacelle_angle, nacelle_rate, dt), reference, applied, noise, work)
 
 
-@njit(cache=True, error_model="numpy", _nrt=False)
+@inner_kernel
 def _advance(
     tables: PilotTables,
     state: FloatArray,
@@ -230,7 +231,6 @@ def _advance(
     offset_at = last_at + n
     count = 4 * (1 + hands)
     motion = motion_size(tables)
-    seen = pad4(displays)
 
     trim = work[:count]
     own = work[count : count + OFFSETS]
