@@ -16,7 +16,7 @@ from rtsim.aircraft.rotor_kernels import (
     inflow_rates,
     rotor_loads,
 )
-from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
+from rtsim.aircraft.signals import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
 from rtsim.aircraft.table_kernels import FloatArray, curve
 from rtsim.aircraft.tables import AircraftTables, ControlTables, MassTables
 from rtsim.aircraft.tail_kernels import tail_load
@@ -235,7 +235,11 @@ def outputs(
     y[OUTPUT.airspeed_rate] = (
         xdot[STATE.u] * ct + xdot[STATE.w] * st + (x[STATE.w] * ct - x[STATE.u] * st) * x[STATE.q]
     )
-    y[OUTPUT.wing_angle_of_attack] = work[WORK_WING_ALPHA]
+    # The angle of attack is undefined at rest: SCHEDULING_SPEED along the horizon makes the output smooth there and leaves
+    # level flight as it is.
+    ua, wa = x[STATE.u] + u[INPUT.gust_u], x[STATE.w] + u[INPUT.gust_w]
+    smooth_alpha = math.atan2(wa + SCHEDULING_SPEED * st, ua + SCHEDULING_SPEED * ct)
+    y[OUTPUT.wing_angle_of_attack] = work[WORK_WING_ALPHA] - math.atan2(wa, ua) + smooth_alpha
     y[OUTPUT.flapping] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2)
 
 

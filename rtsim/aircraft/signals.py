@@ -19,6 +19,9 @@ class Variable:
     """One sentence for people."""
 
 
+SCHEDULING_SPEED = 4.5
+"""Added along the horizon before an angle of attack is taken for scheduling or output: defined in hover too [m/s]."""
+
 STATES: tuple[Variable, ...] = (
     Variable("u", "m/s", "Air-relative velocity along the body x axis (forward)"),
     Variable("w", "m/s", "Air-relative velocity along the body z axis (down)"),

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.signals import SCHEDULING_SPEED
 from rtsim.compiled import kernel
 from rtsim.units import GRAVITY
 
@@ -45,7 +46,7 @@ FLAG_NACELLE = 4
 FLAG_NO_TRIM = 8
 """Bit of the flags: a neighbouring grid point has no trim and was filled from the nearest airspeed that has one."""
 
-ALPHA_SPEED = 4.5
+ALPHA_SPEED = SCHEDULING_SPEED
 """V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
 GAP_NONE = math.radians(1.0)
 """Layers whose angles of attack differ by less than this are not blended [rad]."""
