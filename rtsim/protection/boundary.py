@@ -23,7 +23,7 @@ MODEL_PITCH = deg(15.0)
 """Nose-up attitude of a level trim at which the computed low-speed side begins; the design chart's is 12 to 16 deg."""
 NO_LIMIT = 1e6
 """Stands for a speed without limit where lines are interpolated [m/s]."""
-_SAMPLES = deg(np.arange(0.0, 95.01, 0.5))
+_SAMPLES = deg(0.5) * np.arange(191)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,10 +13,17 @@ from typing import NamedTuple
 
 from numba import njit
 
-from rtsim.corridor.corridor_kernels import CorridorTables, boundary_speed
 from rtsim.frame import FloatArray
 from rtsim.protection import prediction_kernels as model
-from rtsim.protection.prediction_kernels import ModelTables, accelerations, affine, model_at, roll_out
+from rtsim.protection.prediction_kernels import (
+    BoundaryTables,
+    ModelTables,
+    accelerations,
+    affine,
+    model_at,
+    roll_out,
+    speed_range,
+)
 
 LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
 
@@ -148,7 +155,7 @@ class ProtectionTables(NamedTuple):
     """Frames from one decision to the next."""
     model: ModelTables
     """The aircraft as the law knows it."""
-    corridor: CorridorTables
+    corridor: BoundaryTables
     """The boundaries it keeps to."""
     torque: TorqueTables
     """The torque it keeps to."""
@@ -250,8 +257,10 @@ def _govern(
             tables.model, tables.corridor, cell, z, controls, nacelle, (back, settings.horizon), bias, time, guard, out
         )
         turned = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
-        share = 0.0
-        if turned > ends:
+        # Aft is the way out on the low side and forward on the high side even where the nacelles' own pull or drag
+        # costs margin at first: only a turn that is seen to suffice may be slower than the fastest.
+        share = 1.0
+        if turned > settings.reverse_margin:
             share = _clip((settings.reverse_margin - ends) / (turned - ends), 0.25, 1.0)
         if low_side:
             state[L_RATE_LOW] = share * back
@@ -299,10 +308,7 @@ def _recover(
     """Recovery stick and lever: the regulator about the trim of an airspeed well inside the corridor."""
     settings = tables.settings
     airspeed, angle, climb = flight
-    low = boundary_speed(tables.corridor.low_nacelle, tables.corridor.low_speed, angle)
-    high = boundary_speed(tables.corridor.high_nacelle, tables.corridor.high_speed, angle)
-    if angle <= tables.corridor.downstop_nacelle:
-        high = tables.corridor.downstop_speed
+    low, high = speed_range(tables.corridor, angle)
     aim = airspeed
     if state[L_RECOVER_SIDE] < 0.0:
         aim = max(airspeed, low + settings.recovery_margin)

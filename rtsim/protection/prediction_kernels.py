@@ -14,9 +14,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from rtsim.corridor.corridor_kernels import CorridorTables, boundary_speed
 from rtsim.frame import FloatArray
-from rtsim.ramp_filter_kernels import critically_damped_ramp
 from rtsim.units import GRAVITY
 
 # Places in one cell of ModelTables.cells.
@@ -63,6 +61,38 @@ class ModelTables(NamedTuple):
     """Smallest nacelle command angle [rad]."""
     aft_stop: float
     """Largest nacelle command angle [rad]."""
+
+
+class BoundaryTables(NamedTuple):
+    """A corridor sampled evenly in nacelle angle, from 0 up, so that a look-up needs no search; read-only."""
+
+    spacing: float
+    """Distance of the samples [rad]; every corner of a published boundary is a sample."""
+    low: FloatArray
+    """Low-speed side, shape (n,) [m/s]."""
+    high: FloatArray
+    """High-speed side off the downstop, shape (n,) [m/s]."""
+    downstop_nacelle: float
+    """At and below this angle the nacelles rest on the downstop [rad]."""
+    downstop_speed: float
+    """High-speed side on the downstop [m/s]."""
+
+
+@njit(cache=True, error_model="numpy")
+def speed_range(tables: BoundaryTables, angle: float) -> tuple[float, float]:
+    """Lowest and highest allowed airspeed at a nacelle angle [m/s].
+
+    Args:
+        tables: The boundaries.
+        angle: Nacelle angle [rad].
+    """
+    place = min(max(angle / tables.spacing, 0.0), tables.low.shape[0] - 1.000001)
+    k = int(place)
+    share = place - k
+    low = tables.low[k] + share * (tables.low[k + 1] - tables.low[k])
+    if angle <= tables.downstop_nacelle:
+        return low, tables.downstop_speed
+    return low, tables.high[k] + share * (tables.high[k + 1] - tables.high[k])
 
 
 @njit(cache=True, error_model="numpy")
@@ -176,7 +206,7 @@ def accelerations(
 @njit(cache=True, error_model="numpy")
 def roll_out(
     tables: ModelTables,
-    corridor: CorridorTables,
+    corridor: BoundaryTables,
     cell: FloatArray,
     start: tuple[float, float, float, float],
     controls: tuple[float, float],
@@ -210,34 +240,28 @@ def roll_out(
     step, horizon = time
     steepest, sharpness = pitch_guard
     here = angle
-    frequency = tables.nacelle_frequency
-    count = int(horizon / step + 0.5)
+    f = tables.nacelle_frequency
+    settle = math.exp(-f * step)
     fade = math.exp(-step / decay)
     carried = 0.0  # airspeed gained from what the model misses
     out[OUT_TIME] = horizon
     out[OUT_SIDE] = 0.0
+    out[OUT_LOW], out[OUT_HIGH] = 1e9, 1e9
     before = 0.0
-    for k in range(count + 1):
-        r = wanted if k * step < hold - 1e-9 else 0.0
+    for k in range(int(horizon / step + 0.5) + 1):
         a, b, m, _, airspeed = accelerations(cell, (u, w, q, pitch), controls, (angle - here, rate))
         airspeed += carried
-        low = airspeed - boundary_speed(corridor.low_nacelle, corridor.low_speed, angle)
-        high = corridor.downstop_speed
-        if angle > corridor.downstop_nacelle:
-            high = boundary_speed(corridor.high_nacelle, corridor.high_speed, angle)
-        high -= airspeed
+        slowest, fastest = speed_range(corridor, angle)
+        low, high = airspeed - slowest, fastest - airspeed
         margin = min(low, high)
-        if k == 0:
-            out[OUT_LOW], out[OUT_HIGH] = low, high
-        else:
-            out[OUT_LOW] = min(out[OUT_LOW], low)
-            out[OUT_HIGH] = min(out[OUT_HIGH], high)
-        if out[OUT_SIDE] == 0.0 and margin < 0.0:
+        out[OUT_LOW] = min(out[OUT_LOW], low)
+        out[OUT_HIGH] = min(out[OUT_HIGH], high)
+        out[OUT_LOW_END], out[OUT_HIGH_END] = low, high
+        if margin < 0.0 and out[OUT_SIDE] == 0.0:
             share = before / (before - margin) if k > 0 and before > margin else 0.0
-            out[OUT_TIME] = max(0.0, (k - 1 + share) * step) if k > 0 else 0.0
+            out[OUT_TIME] = (k - 1 + share) * step if k > 0 else 0.0
             out[OUT_SIDE] = -1.0 if low < high else 1.0
         before = margin
-        out[OUT_LOW_END], out[OUT_HIGH_END] = low, high
         # Semi-implicit: the fast pitch motion first, so that a step of a tenth of a second stays stable.
         up = sharpness * (sharpness * (steepest - pitch) - 2.0 * q)
         down = -sharpness * (sharpness * (steepest + pitch) + 2.0 * q)
@@ -247,10 +271,16 @@ def roll_out(
         w += step * b
         carried += step * missing
         missing *= fade
-        travel = r
+        # The nacelles' critically damped filter of a ramp, in closed form (rtsim.ramp_filter_kernels).
+        r = wanted if k * step < hold - 1e-9 else 0.0
         if command + r * step < tables.forward_stop:
-            travel = (tables.forward_stop - command) / step
+            r = (tables.forward_stop - command) / step
         elif command + r * step > tables.aft_stop:
-            travel = (tables.aft_stop - command) / step
-        angle, rate, _ = critically_damped_ramp(frequency, command, travel, angle, rate, step)
-        command += travel * step
+            r = (tables.aft_stop - command) / step
+        lag = 2.0 * r / f
+        e = angle - command + lag
+        d = rate - r
+        g = d + f * e
+        command += r * step
+        angle = command - lag + (e + g * step) * settle
+        rate = r + (d - f * g * step) * settle

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
+import numpy as np
+
+from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.protection.boundary import BoundaryName, guarded_corridor, load_boundary
 from rtsim.protection.law_kernels import LawSettings, ProtectionTables
 from rtsim.protection.limits import frames_per_decision, load_limits, load_settings, load_weights
 from rtsim.protection.model import reduce_model
+from rtsim.protection.prediction_kernels import BoundaryTables
+from rtsim.units import deg
 
 LawName = Literal["off", "monitor", "governor", "full"]
 LAW_NAMES: tuple[LawName, ...] = get_args(LawName)
 """The built-in laws; the number of a law in compiled code is its place here."""
+SPACING_DEG = 0.1
+"""Spacing of the sampled boundaries [deg]: the published corners are given to a tenth of a degree."""
 
 
 def law_tables(
@@ -46,10 +53,29 @@ def law_tables(
         law=LAW_NAMES.index(law),
         every=frames_per_decision(dt),
         model=reduce_model(database, load_weights()),
-        corridor=corridor.tables(),
+        corridor=sample_boundary(corridor),
         torque=limits.torque,
         settings=load_settings(dt=dt) if settings is None else settings,
     )
 
 
-__all__ = ["LAW_NAMES", "LawName", "law_tables"]
+def sample_boundary(corridor: Corridor) -> BoundaryTables:
+    """Sample a corridor evenly in nacelle angle.
+
+    Args:
+        corridor: The boundaries.
+    """
+    angles = deg(SPACING_DEG) * np.arange(round(95.0 / SPACING_DEG) + 1)
+    low, high = np.asarray(corridor.low.at(angles)), np.asarray(corridor.high.at(angles))
+    low.setflags(write=False)
+    high.setflags(write=False)
+    return BoundaryTables(
+        spacing=deg(SPACING_DEG),
+        low=low,
+        high=high,
+        downstop_nacelle=corridor.downstop_nacelle,
+        downstop_speed=corridor.downstop_speed,
+    )
+
+
+__all__ = ["LAW_NAMES", "LawName", "law_tables", "sample_boundary"]
