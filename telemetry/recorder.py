@@ -154,7 +154,8 @@ class Recorder:
         finally:
             if self._process.poll() is None:
                 self._process.kill()
-            self._process.wait()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(1.0)  # one that waits for a dead disk cannot even be killed
             for stream in (self._process.stdin, self._process.stdout):
                 with contextlib.suppress(OSError):
                     stream.close()  # type: ignore[union-attr]  # both are pipes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import time
+import warnings
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,20 @@ UNWATCHED_PERIOD_S = 1.0
 """Both periods where nobody watches: every chunk costs more than a kilobyte in the file [s]."""
 
 _SERVER_MEMORY = "256MiB"
+
+
+def is_whole(recording: Path) -> bool:
+    """Whether a finished recording was written to its end; Rerun itself does not tell of a disk that is full.
+
+    Args:
+        recording: The file.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # a file without its closing index is only warned of
+        try:
+            return bool(rr.chunk.RrdReader(str(recording)).recordings())
+        except (OSError, RuntimeError, Warning):
+            return False
 
 
 class Streamer:
@@ -99,19 +114,27 @@ class Streamer:
             self._recording.set_time("sim_time", duration=0.0)
         self._plots.event(text, level)
 
-    def close(self, *, linger_s: float = 0.0) -> None:
+    def close(self, *, linger_s: float = 0.0) -> list[Path]:
         """Send what is left and finish the files.
 
         Args:
             linger_s: How long to go on serving a viewer, so that it gets the last rows [s].
+
+        Returns:
+            Files that are not whole and therefore keep their partial name.
         """
         self._end_run()
         if linger_s > 0.0:
             time.sleep(linger_s)
         if self._host is not None:
             self._host.disconnect()
+        broken = []
         for partial, final in self._files:
-            partial.replace(final)
+            if is_whole(partial):
+                partial.replace(final)
+            else:
+                broken.append(partial)
+        return broken
 
     def _open(self) -> None:
         """Begin a recording; the first also hosts the server through which all of them reach the viewer."""

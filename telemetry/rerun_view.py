@@ -266,7 +266,8 @@ class RerunView:
         process = self._process
         assert process is not None
         process.kill()
-        process.wait()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(0.1)  # one that waits for a dead disk cannot even be killed
         if self._viewer_pid is not None:
             with contextlib.suppress(OSError):
                 os.killpg(self._viewer_pid, signal.SIGKILL)

@@ -160,16 +160,16 @@ def test_a_reset_begins_a_new_recording(tmp_path: Path, told: list[str]) -> None
 
 def test_a_frozen_view_is_replaced_once_and_then_given_up(tmp_path: Path, told: list[str]) -> None:
     record = tmp_path / "flight.rrd"
-    options = ViewOptions(viewer=False, record=record, stall_timeout_s=0.7)
-    rows = rows_of_a_conversion(3.0)
+    options = ViewOptions(viewer=False, record=record, stall_timeout_s=2.0)
+    rows = rows_of_a_conversion(6.0)
     with viewing(options, told) as view:
         for attempt in range(2):
             assert view.wait_ready(30.0)
             assert view._process is not None
             os.kill(view._process.pid, signal.SIGSTOP)
-            slowest = fly(view, rows[attempt * 375 : attempt * 375 + 375])
+            slowest = fly(view, rows[attempt * 750 : attempt * 750 + 750])
             assert slowest < 0.25, "the flight never stalls"
-        assert "did not move for 1 s; it was started again" in told[0]
+        assert "did not move for 2 s; it was started again" in told[0]
         assert "given up" in told[1]
         assert not view.alive
         fly(view, rows[:50], warp=10.0)  # and goes on without the view
@@ -307,6 +307,21 @@ def test_the_view_finishes_its_file_and_ends_when_the_flight_is_killed(tmp_path:
     worker.wait(10.0)
     assert record.exists()
     assert not partial_name(record).exists()
+
+
+def test_a_recording_that_cannot_be_written_to_its_end_keeps_its_partial_name(tmp_path: Path, told: list[str]) -> None:
+    # The kernel lets no file of the view grow beyond the limit: what a full disk does, without one.
+    record = tmp_path / "flight.rrd"
+    view = RerunView(ViewOptions(viewer=False, record=record), corridor=OUTLINE, on_message=told.append)
+    assert view.wait_ready(30.0)
+    assert view._process is not None
+    psutil.Process(view._process.pid).rlimit(psutil.RLIMIT_FSIZE, (900_000, 900_000))
+    fly(view, rows_of_a_conversion(4.0))
+    view.close()
+    assert view.failure is not None
+    assert "the recording is incomplete" in str(view.failure)
+    assert partial_name(record).exists()
+    assert not record.exists()
 
 
 def test_an_unwritable_recording_is_refused_before_the_flight(tmp_path: Path) -> None:
