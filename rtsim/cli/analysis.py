@@ -13,6 +13,8 @@ from rtsim.cli.output import emit_json, results
 from rtsim.errors import InputError, TrimError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import numpy as np
     import numpy.typing as npt
 
@@ -33,6 +35,8 @@ _WEIGHT = typer.Option(help="Weight [lb]; solves the nonlinear model.")
 _ALTITUDE = typer.Option(help="Pressure altitude [m], standard atmosphere; solves the nonlinear model.")
 _ACCELERATION = typer.Option(help="Acceleration in level flight [kn/s]; solves the nonlinear model.")
 _DATABASE = typer.Option(help="Another LPV database than the shipped one (.nc or .mat).")
+_CLOSED_LOOP = typer.Option("--closed-loop", help="Aircraft, pilot and outer loops together, sampled as flown.")
+_OUTER_LOOP = typer.Option(help="How the pilot holds airspeed and altitude: integrators or pi (with --closed-loop).")
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 
 
@@ -147,12 +151,15 @@ def linearize_command(
     altitude_m: Annotated[float | None, _ALTITUDE] = None,
     acceleration_kt_s: Annotated[float | None, _ACCELERATION] = None,
     database: Annotated[Path | None, _DATABASE] = None,
+    closed_loop: Annotated[bool, _CLOSED_LOOP] = False,
+    outer_loop: Annotated[str, _OUTER_LOOP] = "integrators",
     json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Show one linear model: matrices with named states, inputs and outputs, and the eigenvalues.
 
     From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m and
-    --acceleration-kt-s, from the nonlinear model trimmed at exactly that condition.
+    --acceleration-kt-s, from the nonlinear model trimmed at exactly that condition. With --closed-loop, aircraft, pilot
+    and outer loops as flown: A is the map over one 4 ms frame, and the eigenvalues are log(z)/dt.
 
     Args:
         airspeed_kt: Horizontal airspeed [kn].
@@ -164,17 +171,24 @@ def linearize_command(
         altitude_m: Pressure altitude [m].
         acceleration_kt_s: Level acceleration [kn/s].
         database: Another LPV database.
+        closed_loop: Add pilot and outer loops as flown.
+        outer_loop: How the pilot holds airspeed and altitude: integrators or pi.
         json: Print one JSON object on stdout.
 
     Raises:
         TrimError: There is no trim to linearize at.
+        InputError: An option is out of range, or the closed loop is asked for where no pilot was designed.
     """
     request = _checked(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
                 database)
     )  # fmt: skip
-    model = _nonlinear_model(request) if request.solves_nonlinear else _database_model(request)
-    result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model, "eigenvalues": eigenvalues(model["A"])}
+    if closed_loop:
+        model = _closed_loop_model(request, outer_loop)
+    else:
+        model = _nonlinear_model(request) if request.solves_nonlinear else _database_model(request)
+        model["eigenvalues"] = eigenvalues(model["A"])
+    result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
     if json:
         emit_json(result)
     else:
@@ -192,7 +206,10 @@ def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
     """
     import numpy as np
 
-    roots = sorted(np.linalg.eigvals(A), key=lambda root: (abs(root), root.imag))
+    return _described(np.linalg.eigvals(A))
+
+
+def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
     return [
         {
             "re": float(root.real),
@@ -200,7 +217,7 @@ def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
             "wn_rad_s": float(abs(root)),
             "zeta": float(-root.real / abs(root)) if abs(root) > 0.0 else 0.0,
         }
-        for root in roots
+        for root in sorted(roots, key=lambda root: (abs(root), root.imag))
     ]
 
 
@@ -339,6 +356,64 @@ def _database_model(request: Request) -> dict[str, Any]:
     return _model_result((database.states, database.inputs, database.outputs), matrices)
 
 
+def _closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
+    """The frozen loop of aircraft and pilot, sampled as flown."""
+    import numpy as np
+
+    from rtsim.pilot.frozen import Condition as Command
+    from rtsim.pilot.frozen import frozen_loop
+    from rtsim.pilot.schedule import OUTER_LOOPS
+    from rtsim.units import deg, kt
+
+    if request.solves_nonlinear:
+        raise InputError(
+            "the pilot is designed for the database's own condition",
+            key="--closed-loop",
+            mend="leave out --nonlinear, flaps, rotor speed, weight, altitude and acceleration",
+        )
+    chosen = next((name for name in OUTER_LOOPS if name == outer_loop), None)
+    if chosen is None:
+        raise InputError("no such outer loop", key="--outer-loop", value=outer_loop, allowed=", ".join(OUTER_LOOPS))
+    aircraft = _lpv(request)
+    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
+    point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
+    if not point.converged:
+        raise _no_trim(request, point)
+    database = aircraft.database
+    if chosen not in database.pilot:
+        raise InputError(
+            "the database holds no gains of this pilot",
+            key="--outer-loop",
+            value=outer_loop,
+            allowed=", ".join(database.pilot) or "none",
+            mend="run 'rtsim model build'",
+        )
+    loop = frozen_loop(database, Command(airspeed, nacelle), outer_loop=chosen)
+    matrix = loop.matrix
+    pilot_states = matrix.shape[0] - len(database.states)
+    names = [variable.name for variable in database.states] + [f"pilot_{k}" for k in range(pilot_states)]
+    growth = loop.growth()
+    return {
+        "states": names,
+        "inputs": [],
+        "outputs": [],
+        "units": {
+            "states": [variable.unit for variable in database.states] + [""] * pilot_states,
+            "inputs": [],
+            "outputs": [],
+        },
+        "A": matrix,
+        "B": np.zeros((len(names), 0)),
+        "C": np.zeros((0, len(names))),
+        "D": np.zeros((0, 0)),
+        "dt_s": loop.dt,
+        "outer_loop": outer_loop,
+        "eigenvalues": _described(loop.eigenvalues()),
+        "growth_rad_s": growth,
+        "stable": growth < 0.0,
+    }
+
+
 def _model_result(
     variables: tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]],
     matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
@@ -375,7 +450,10 @@ def _print_model(result: dict[str, Any]) -> None:
     for root in result["eigenvalues"]:
         table.add_row(*(f"{root[key]:.4f}" for key in ("re", "im", "wn_rad_s", "zeta")))
     results.print(table)
-    results.print("States: " + ", ".join(result["states"]))
-    results.print("Inputs: " + ", ".join(result["inputs"]))
-    results.print("Outputs: " + ", ".join(result["outputs"]))
+    if "stable" in result:
+        verdict = "stable" if result["stable"] else "unstable"
+        results.print(f"The loop as flown is {verdict}: slowest growth {result['growth_rad_s']:+.4f} rad/s")
+    for kind in ("states", "inputs", "outputs"):
+        if result[kind]:
+            results.print(f"{kind.capitalize()}: " + ", ".join(result[kind]))
     results.print("The matrices are printed with --json.")

@@ -1,0 +1,59 @@
+"""The LPV aircraft judged by the nonlinear model: the same pilot flies both over whole manoeuvres.
+
+Source of the limits: the project's requirements (RMS over Table 1: 0.3 kn, 0.5 m, 0.4 deg, 0.15 deg of flapping). An
+independent build of the same data reached 0.04 kn, 0.02 m, 0.04 deg, 0.02 deg. Measured here: docs/lpv.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rtsim.frame import COLUMN
+from rtsim.programme import Programme
+from rtsim.simulation import FlightSetup, Simulation
+from scenarios.loader import load_scenario
+
+LIMITS = {"airspeed_kt": 0.3, "altitude_m": 0.5, "pitch_deg": 0.4, "flapping_deg": 0.15}
+
+
+def fly(programme, plant):
+    simulation = Simulation(FlightSetup(programme=programme, plant=plant))
+    return simulation.run(round(programme.duration * 250))
+
+
+def rms_errors(programme, plant="lpv"):
+    truth, mine = fly(programme, "nonlinear"), fly(programme, plant)
+    assert len(truth) == len(mine) == round(programme.duration * 250)
+    errors = {}
+    for name in LIMITS:
+        column = getattr(COLUMN, name)
+        errors[name] = float(np.sqrt(np.mean((mine[:, column] - truth[:, column]) ** 2)))
+    return errors
+
+
+def slowed(programme, factor):
+    return Programme(programme.time * factor, programme.airspeed, programme.nacelle_angle, programme.altitude)
+
+
+@pytest.mark.parametrize("name", ["typical_conversion", "typical_conversion_rate3", "conversion_8deg", "reconversion"])
+def test_whole_manoeuvres(name):
+    errors = rms_errors(load_scenario(name).programme)
+    for signal, limit in LIMITS.items():
+        assert errors[signal] <= limit, errors
+
+
+@pytest.mark.parametrize("factor", [1.6, 2.4])
+@pytest.mark.parametrize("name", ["typical_conversion", "reconversion"])
+def test_accelerations_between_the_layers(name, factor):
+    errors = rms_errors(slowed(load_scenario(name).programme, factor))
+    for signal, limit in LIMITS.items():
+        assert errors[signal] <= limit, errors
+
+
+def test_angle_of_attack_as_third_variable_is_what_makes_it_so_close():
+    """The paper's two-variable form misses the accelerated trims; if this fails, the layers have lost their use."""
+    programme = load_scenario("typical_conversion").programme
+    plain, layered = rms_errors(programme, "lpv-plain"), rms_errors(programme)
+    for signal in LIMITS:
+        assert plain[signal] > 3.0 * layered[signal], (plain, layered)
