@@ -24,7 +24,7 @@ LAYERS = (
     ("rtsim.simulation_kernels",),
     ("rtsim.simulation_setup",),
     ("rtsim.simulation",),
-    ("rtsim.realtime",),
+    ("rtsim.realtime", "rtsim.optimization"),
     ("scenarios",),
     ("rtsim.cli", "rtsim.__main__"),
 )
