@@ -34,7 +34,12 @@ class Signal:
 SIGNALS: tuple[Signal, ...] = (
     Signal("frame", "", "time", "Number of the frame, from 0."),
     Signal("time_s", "s", "time", "Simulated time at the start of the frame, frame * dt."),
-    Signal("airspeed_kt", "kn", "speed", "Horizontal true airspeed, signed; equals calibrated airspeed at sea level."),
+    Signal(
+        "airspeed_kt",
+        "kn",
+        "speed",
+        "Horizontal true airspeed with gusts, signed; equals calibrated airspeed at sea level.",
+    ),
     Signal("airspeed_reference_kt", "kn", "speed", "Airspeed reference after its 1.5 rad/s filter."),
     Signal("nacelle_deg", "deg", "nacelle", "Nacelle angle: 90 helicopter, 0 airplane."),
     Signal(
@@ -47,7 +52,12 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("lever", "", "controls", "Power lever after protection, 0 to 1."),
     Signal("pilot_stick", "", "controls", "Longitudinal stick as the pilot gave it."),
     Signal("pilot_lever", "", "controls", "Power lever as the pilot gave it."),
-    Signal("pilot_nacelle_rate_rad_s", "rad/s", "nacelle", "Nacelle rate as the pilot gave it (SI, so that a replay gets it to the last bit)."),
+    Signal(
+        "pilot_nacelle_rate_rad_s",
+        "rad/s",
+        "nacelle",
+        "Nacelle rate as the pilot gave it (SI, so that a replay gets it to the last bit).",
+    ),
     Signal(
         "nacelle_command_rate_deg_s",
         "deg/s",
@@ -93,6 +103,11 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("on_downstop", "", "nacelle", "1 while the nacelles rest on the airplane-mode stop."),
     Signal("control_on_stop", "", "controls", "1 while stick, lever, cyclic or elevator is on a stop."),
     Signal("pilot_mode", "", "controls", "Who flies: 0 MOCM, 1 external command, 2 hold."),
+    Signal("airspeed_indicated_kt", "kn", "speed", "Airspeed as the sensor shows it to pilot and laws."),
+    Signal("gust_u_m_s", "m/s", "air", "Gust added to the air-relative velocity along body x."),
+    Signal("gust_w_m_s", "m/s", "air", "Gust added to the air-relative velocity along body z."),
+    Signal("gust_q_deg_s", "deg/s", "air", "Pitch gust added to the air-relative pitch rate."),
+    Signal("failures", "", "failures", "Active failures, a sum of the bits in docs/faults.md."),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

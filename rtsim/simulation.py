@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,10 +11,14 @@ import numpy as np
 from rtsim import simulation_kernels as kernels
 from rtsim.aids import AIDS, AidName
 from rtsim.aircraft.signals import INPUT, STATE
+from rtsim.atmosphere import Gust, Turbulence, add_gust, normals_needed, set_turbulence
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
+from rtsim.faults import Fault
+from rtsim.faults.fault_kernels import fault_apply, fault_nacelle_ok
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.programme import Programme
+from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
 from rtsim.units import DEGREE, INCH_POUND, KNOT
 
@@ -44,7 +49,7 @@ class Snapshot:
     state: kernels.SimulationState
     """Copies of every array the frame changes."""
     random_stream: dict[str, object]
-    """State of the pilot-noise generator."""
+    """State of the generators of pilot noise and turbulence, and the noise drawn for this frame."""
 
 
 class Simulation:
@@ -65,10 +70,11 @@ class Simulation:
         self.setup = setup
         self._parts: Parts = build_parts(setup)
         self.tables = self._parts.tables
-        self._state = start_state(setup, self._parts)
+        self._random = stream_generator(setup.seed, STREAM_PILOT)
+        self._air_random = stream_generator(setup.seed, STREAM_TURBULENCE)
+        self._state = start_state(setup, self._parts, self._air_random.standard_normal(3))
         self._scratch = self._parts.scratch
         self._noise_width = self._parts.noise_width
-        self._random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([setup.seed, 0])))
         self._row = np.zeros(SIGNAL_COUNT)
         self._command = np.zeros(3)
         self._applied = np.zeros(3)
@@ -124,15 +130,19 @@ class Simulation:
         self.step(Command(0.0, 0.5, 0.0))
         self.set_pilot("external")
         self.set_pilot("mocm")
+        self.set_fault(Fault(kind="nacelle-jammed", start=0.0), on=True)
+        self.set_turbulence(Turbulence.of_severity("light"))
         self.run(2)
+        self.step()
         self.restore(snapshot)
 
     def reset(self) -> None:
         """Go back to frame 0, random stream included."""
-        fresh = start_state(self.setup, self._parts)
+        self._random = stream_generator(self.setup.seed, STREAM_PILOT)
+        self._air_random = stream_generator(self.setup.seed, STREAM_TURBULENCE)
+        fresh = start_state(self.setup, self._parts, self._air_random.standard_normal(3))
         for mine, start in zip(self._state, fresh, strict=True):
             mine[:] = start
-        self._random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.setup.seed, 0])))
         self._observed = False
 
     def sensors(self) -> Sensors:
@@ -141,7 +151,7 @@ class Simulation:
         x = self._state.x
         return Sensors(
             time=float(row[COLUMN.time_s]),
-            airspeed=float(row[COLUMN.airspeed_kt]) * KNOT,
+            airspeed=float(row[COLUMN.airspeed_indicated_kt]) * KNOT,
             airspeed_rate=float(row[COLUMN.airspeed_rate_kt_s]) * KNOT,
             nacelle_angle=float(self._scratch.motion[0]),
             nacelle_rate=float(self._scratch.motion[1]),
@@ -154,7 +164,7 @@ class Simulation:
             mast_torque=float(row[COLUMN.mast_torque_inlb]) * INCH_POUND,
             flapping=float(row[COLUMN.flapping_deg]) * DEGREE,
             on_downstop=bool(row[COLUMN.on_downstop]),
-            nacelle_ok=True,
+            nacelle_ok=bool(fault_nacelle_ok(self._state.faults)),
         )
 
     def reference(self) -> Reference:
@@ -171,9 +181,9 @@ class Simulation:
         )
 
     def margins(self) -> Margins:
-        """Distances to the corridor boundaries at the start of this frame."""
+        """Distances to the corridor boundaries at the start of this frame, by the airspeed that is indicated."""
         self._observe()
-        low, high, forward, aft = (float(value) for value in self._scratch.margins)
+        low, high, forward, aft = (float(value) for value in self._scratch.shown[1:])
         return Margins(low=low, high=high, nacelle_forward=forward, nacelle_aft=aft)
 
     def pilot_command(self) -> Command:
@@ -197,7 +207,10 @@ class Simulation:
             # One call instead of three: handing the tables over costs more than the frame itself.
             if self._noise_width:
                 self._noise[:] = self._random.standard_normal(self._noise_width)
-            kernels.run_frames(self.tables, self._state, self._scratch, self._noise[None, :], self._row[None, :])
+            air_noise = self._air_random.standard_normal((1, normals_needed(self._state.gusts)))
+            kernels.run_frames(
+                self.tables, self._state, self._scratch, self._noise[None, :], air_noise, self._row[None, :]
+            )
             return self._row.copy()
         self._observe()
         if command is not None:
@@ -218,7 +231,16 @@ class Simulation:
                 mend="give stick, lever and nacelle rate as finite numbers",
             )
         kernels.advance(
-            self.tables, self._state, self._scratch, self._row, (self._command, self._applied, self._noise)
+            self.tables,
+            self._state,
+            self._scratch,
+            self._row,
+            (
+                self._command,
+                self._applied,
+                self._noise,
+                self._air_random.standard_normal(normals_needed(self._state.gusts)),
+            ),
         )
         self._observed = False
         return self._row.copy()
@@ -240,7 +262,8 @@ class Simulation:
             if first:
                 noise[0] = self._noise
             noise[first:] = self._random.standard_normal((frames - first, self._noise_width))
-        flown = int(kernels.run_frames(self.tables, self._state, self._scratch, noise, rows))
+        air_noise = self._air_random.standard_normal((frames, normals_needed(self._state.gusts)))
+        flown = int(kernels.run_frames(self.tables, self._state, self._scratch, noise, air_noise, rows))
         if frames:
             self._observed = False
         return rows[:flown]
@@ -280,10 +303,46 @@ class Simulation:
             raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(AIDS))
         self._state.switches[AIDS[name]] = 1.0 if on else 0.0
 
+    def set_fault(self, fault: Fault, on: bool) -> None:
+        """Let a failure begin or end with this frame.
+
+        Args:
+            fault: The failure; its times do not count.
+            on: Begins; else ends.
+        """
+        self._observe()
+        airspeed = float(self._row[COLUMN.airspeed_kt]) * KNOT
+        state, frequency = self._state, self.tables.nacelle.frequency
+        fault_apply(state.faults, fault.change(on=on, time=self.time), state.x, state.nacelle, frequency, airspeed)
+        kernels.observe(self.tables, state, self._scratch, self._row)
+
+    def add_gust(self, gust: Gust) -> None:
+        """Add a gust to the air ahead; it is felt from the frame after this one at the earliest.
+
+        Args:
+            gust: The gust; a start that has passed counts as now.
+
+        Raises:
+            InputError: As many live gusts as fit are still acting.
+        """
+        add_gust(self._state.gusts, dataclasses.replace(gust, start=max(gust.start, self.time)))
+
+    def set_turbulence(self, turbulence: Turbulence) -> None:
+        """Let the turbulence move to another severity, beginning with the frame after this one.
+
+        Args:
+            turbulence: What it becomes; its ``fade_in`` is the time of the change.
+        """
+        set_turbulence(self._state.gusts, turbulence, self._air_random.standard_normal(3))
+
     def snapshot(self) -> Snapshot:
         """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""
         self._observe()
-        noise_state = {"generator": self._random.bit_generator.state, "drawn": self._noise.copy()}
+        noise_state = {
+            "generator": self._random.bit_generator.state,
+            "drawn": self._noise.copy(),
+            "air": self._air_random.bit_generator.state,
+        }
         return Snapshot(kernels.SimulationState(*(array.copy() for array in self._state)), noise_state)
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -295,6 +354,7 @@ class Simulation:
         for mine, saved in zip(self._state, snapshot.state, strict=True):
             mine[:] = saved
         self._random.bit_generator.state = snapshot.random_stream["generator"]
+        self._air_random.bit_generator.state = snapshot.random_stream["air"]
         self._noise[:] = np.asarray(snapshot.random_stream["drawn"])
         kernels.observe(self.tables, self._state, self._scratch, self._row)
         self._observed = True

@@ -17,8 +17,19 @@ from rtsim.aids.aids_kernels import LAST_SWITCHES, AidTables, aids_step
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.aircraft.tables import AircraftTables
+from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, G_Q, G_U, G_W, GustTables, gust_step
 from rtsim.compiled import kernel
 from rtsim.corridor.corridor_kernels import CorridorTables, corridor_level_step, corridor_margins
+from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
+from rtsim.faults.fault_kernels import (
+    FaultTables,
+    fault_actuators_begin,
+    fault_actuators_end,
+    fault_airspeed_error,
+    fault_mask,
+    fault_nacelle_rate,
+    fault_update,
+)
 from rtsim.frame import COLUMN
 from rtsim.lpv.lpv_kernels import LpvTables, lpv_outputs, lpv_step
 from rtsim.nacelle.nacelle_kernels import (
@@ -62,7 +73,6 @@ LANDING_NACELLE = 60.0 * DEGREE
 """Below this nacelle angle the proprotors (12.5 ft radius) would strike the ground."""
 LANDING_SPEED = 60.0 * KNOT
 LARGEST_PITCH = 80.0 * DEGREE
-TRANSMISSION_EFFICIENCY = 0.93
 # The array handed to the pilot, see rtsim.pilot.pilot_kernels.
 TARGET_SIZE = 5
 
@@ -88,6 +98,10 @@ class SimulationTables(NamedTuple):
     """The MOCM's gains and references."""
     aids: AidTables
     """Schedules of the pilot aids; they act on every pilot but the MOCM, which is designed for the bare aircraft."""
+    gusts: GustTables
+    """Parameters of gusts and turbulence."""
+    faults: FaultTables
+    """Failures and their times."""
     programme: FloatArray
     """Rows: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
     reference_frequency: float
@@ -113,6 +127,10 @@ class SimulationState(NamedTuple):
     """State of the pilot aids."""
     switches: FloatArray
     """Which aids are on."""
+    gusts: FloatArray
+    """Turbulence filters, gusts that act or are to come, and what acts now."""
+    faults: FloatArray
+    """Which failures are active."""
     clock: FloatArray
     """Frame number, pilot mode, distance flown [m], LPV flags, end code, sink rate at the end [m/s]."""
 
@@ -132,6 +150,10 @@ class Scratch(NamedTuple):
     """Nacelle angle, rate, acceleration now."""
     margins: FloatArray
     """Corridor margins."""
+    shown: FloatArray
+    """What the airspeed indicator shows [m/s], then the corridor margins that go with it."""
+    seen: FloatArray
+    """Aircraft state as pilot and aids see it: with the indicated airspeed."""
     target: FloatArray
     """What the pilot is asked for."""
     command: FloatArray
@@ -140,6 +162,10 @@ class Scratch(NamedTuple):
     """Stick and lever after protection, before the aids."""
     asked: FloatArray
     """The pilot's command in a compiled run: stick, lever, nacelle rate."""
+    planned: FloatArray
+    """Where failed actuators stand after the frame."""
+    gust: FloatArray
+    """Gust of the next frame in body axes."""
 
 
 @kernel
@@ -179,20 +205,26 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
         row: Written: the frame row, commands excepted.
     """
     x = state.x
+    gusts = state.gusts
     frame = state.clock[CLOCK_FRAME]
     time = frame * tables.dt
     nacelle_at(tables.nacelle, state.nacelle, 0.0, 0.0, scratch.motion)
     angle, rate = scratch.motion[0], scratch.motion[1]
     state.u[INPUT.nacelle_rate] = rate
     state.u[INPUT.nacelle_acceleration] = scratch.motion[2]
+    state.u[INPUT.gust_u] = gusts[G_U]
+    state.u[INPUT.gust_w] = gusts[G_W]
+    state.u[INPUT.gust_q] = gusts[G_Q]
     if tables.plant == PLANT_LPV:
         lpv_outputs(tables.lpv, x, state.u, angle, scratch.y, scratch.work)
     else:
         nonlinear.outputs(tables.aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
-    airspeed = x[STATE.u] * ct + x[STATE.w] * st
+    through = x[STATE.u] * ct + x[STATE.w] * st
+    airspeed = through + gusts[G_AHEAD]
     climb = x[STATE.u] * st - x[STATE.w] * ct
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
+    _see(tables, state, scratch, airspeed)
     y = scratch.y
     rotor_speed = tables.aircraft.configuration.rotor_speed
     power = 2.0 * y[OUTPUT.torque] * rotor_speed
@@ -219,10 +251,10 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.airspeed_command_kt] = programme_at(tables.programme, 1, time) / KNOT
     row[COLUMN.altitude_reference_m] = target[2]
     row[COLUMN.airspeed_rate_kt_s] = y[OUTPUT.airspeed_rate] / KNOT
-    row[COLUMN.ground_speed_kt] = (airspeed + tables.wind) / KNOT
+    row[COLUMN.ground_speed_kt] = (through + tables.wind) / KNOT
     row[COLUMN.climb_rate_m_s] = climb
     row[COLUMN.distance_m] = state.clock[CLOCK_DISTANCE]
-    row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(airspeed), 1.0)) / DEGREE
+    row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(through), 1.0)) / DEGREE
     row[COLUMN.angle_of_attack_deg] = math.atan2(x[STATE.w] + 4.5 * st, x[STATE.u] + 4.5 * ct) / DEGREE
     row[COLUMN.pitch_rate_deg_s] = x[STATE.q] / DEGREE
     row[COLUMN.body_u_m_s] = x[STATE.u]
@@ -234,7 +266,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.collective_75_deg] = x[STATE.collective_75] / DEGREE
     row[COLUMN.cyclic_deg] = x[STATE.cyclic_1s] / DEGREE
     row[COLUMN.elevator_deg] = x[STATE.elevator] / DEGREE
-    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2)
+    speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
     row[COLUMN.flap_deg] = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle) / DEGREE
     row[COLUMN.thrust_per_rotor_lb] = y[OUTPUT.thrust] / POUND_FORCE
     row[COLUMN.power_shp] = power / HORSEPOWER
@@ -248,6 +280,33 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.nacelle_aft_deg] = scratch.margins[3] / DEGREE
     row[COLUMN.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
     row[COLUMN.pilot_mode] = state.clock[CLOCK_MODE]
+    row[COLUMN.airspeed_indicated_kt] = scratch.shown[0] / KNOT
+    row[COLUMN.gust_u_m_s] = gusts[G_U]
+    row[COLUMN.gust_w_m_s] = gusts[G_W]
+    row[COLUMN.gust_q_deg_s] = gusts[G_Q] / DEGREE
+    row[COLUMN.failures] = float(fault_mask(state.faults))
+
+
+@kernel
+def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, airspeed: float) -> None:
+    """Fill what pilots and laws are shown: indicated airspeed, its margins, and the state shifted to agree with it.
+
+    The shift is along the horizon, so that the climb rate computed from the seen state stays the true one.
+    """
+    x, seen, shown = state.x, scratch.seen, scratch.shown
+    error = fault_airspeed_error(state.faults, airspeed)
+    shown[0] = airspeed + error
+    if error == 0.0:
+        for k in range(scratch.margins.shape[0]):
+            shown[1 + k] = scratch.margins[k]
+    else:
+        corridor_margins(tables.corridor, shown[0], scratch.motion[0], shown[1:])
+    for k in range(x.shape[0]):
+        seen[k] = x[k]
+    shift = state.gusts[G_AHEAD] + error
+    if shift != 0.0:
+        seen[STATE.u] += shift * math.cos(x[STATE.pitch])
+        seen[STATE.w] += shift * math.sin(x[STATE.pitch])
 
 
 @kernel
@@ -264,7 +323,14 @@ def pilot_command(
         out: Written: stick, lever, nacelle rate [rad/s].
     """
     mocm_output(
-        tables.pilot, state.pilot, state.x, scratch.motion[0], scratch.motion[1], scratch.target, noise, scratch.command
+        tables.pilot,
+        state.pilot,
+        scratch.seen,
+        scratch.motion[0],
+        scratch.motion[1],
+        scratch.target,
+        noise,
+        scratch.command,
     )
     out[0] = scratch.command[0]
     out[1] = scratch.command[1]
@@ -301,7 +367,7 @@ def advance(
     state: SimulationState,
     scratch: Scratch,
     row: FloatArray,
-    commands: tuple[FloatArray, FloatArray, FloatArray],
+    commands: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> None:
     """Record the command and move the whole simulation to the start of the next frame.
 
@@ -310,9 +376,10 @@ def advance(
         state: Its state, updated in place.
         scratch: Work space as ``observe`` left it.
         row: The frame row, completed.
-        commands: The pilot's command, the command that acts, and this frame's standard normals.
+        commands: The pilot's command, the command that acts, and this frame's standard normals of the pilot and of the
+            air (empty where there is no noise and no turbulence).
     """
-    asked, applied, noise = commands
+    asked, applied, noise, air_noise = commands
     dt = tables.dt
     x, u = state.x, state.u
     angle = scratch.motion[0]
@@ -325,9 +392,10 @@ def advance(
         state.aids[LAST_SWITCHES] = -1.0
     else:
         acting[0], acting[1] = u[INPUT.stick], u[INPUT.lever]
-        aids_step(tables.aids, state.aids, state.switches, x, angle, scratch.hands, acting, dt)
+        aids_step(tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, acting, dt)
     stick, lever = acting[0], acting[1]
-    rate = nacelle_effective_rate(tables.nacelle, state.nacelle, nacelle_assigned_rate(tables.nacelle, applied[2]), dt)
+    rate = fault_nacelle_rate(state.faults, nacelle_assigned_rate(tables.nacelle, applied[2]))
+    rate = nacelle_effective_rate(tables.nacelle, state.nacelle, rate, dt)
     margin = min(scratch.margins[0], scratch.margins[1])
     controls = tables.aircraft.controls
     cyclic_stop = abs(x[STATE.cyclic_1s]) >= controls.cyclic_limit * (1.0 - 1e-9)
@@ -344,16 +412,23 @@ def advance(
     row[COLUMN.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
 
     if state.clock[CLOCK_MODE] == MODE_MOCM:
-        mocm_advance(tables.pilot, state.pilot, x, angle, scratch.motion[1], scratch.target, acting, noise, dt)
+        mocm_advance(
+            tables.pilot, state.pilot, scratch.seen, angle, scratch.motion[1], scratch.target, acting, noise, dt
+        )
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = stick
     u[INPUT.lever] = lever
     before = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
+    power = 2.0 * scratch.y[OUTPUT.torque] * tables.aircraft.configuration.rotor_speed
+    fault_actuators_begin(
+        tables.faults, state.faults, controls, x, (stick, lever), scratch.path[1, 0], power, dt, scratch.planned
+    )
     if tables.plant == PLANT_LPV:
         lpv_step(tables.lpv, x, u, scratch.path, dt, scratch.work)
         state.clock[CLOCK_FLAGS] = scratch.work[0]
     else:
         nonlinear.step(tables.aircraft, x, u, scratch.path, dt, scratch.work)
+    fault_actuators_end(scratch.planned, x)
     after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
     state.clock[CLOCK_DISTANCE] += dt * (0.5 * (before + after) + tables.wind)
     nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
@@ -367,12 +442,41 @@ def advance(
     state.reference[0] = value
     state.reference[1] = value_rate
     state.clock[CLOCK_FRAME] += 1.0
+    disturb(tables, state, scratch, dt, air_noise)
     state.clock[CLOCK_END] = _end_code(tables, state)
 
 
 @kernel
+def disturb(
+    tables: SimulationTables, state: SimulationState, scratch: Scratch, elapsed: float, air_noise: FloatArray
+) -> None:
+    """Bring gusts and failures to the start of the present frame.
+
+    Args:
+        tables: The simulation.
+        state: Its state; gusts and failures are changed, and by a jam the conversion actuator's command.
+        scratch: Work space.
+        elapsed: Length of the frame before; 0 at the start of the flight [s].
+        air_noise: Standard normals of the air; empty where there is no turbulence.
+    """
+    x = state.x
+    time = state.clock[CLOCK_FRAME] * tables.dt
+    pitch = x[STATE.pitch]
+    if state.gusts[G_BUSY] != 0.0:
+        speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2)
+        gust_step(tables.gusts, state.gusts, speed, x[STATE.altitude], pitch, time, elapsed, air_noise, scratch.gust)
+    airspeed = x[STATE.u] * math.cos(pitch) + x[STATE.w] * math.sin(pitch) + state.gusts[G_AHEAD]
+    fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
+
+
+@kernel
 def run_frames(
-    tables: SimulationTables, state: SimulationState, scratch: Scratch, noise: FloatArray, rows: FloatArray
+    tables: SimulationTables,
+    state: SimulationState,
+    scratch: Scratch,
+    noise: FloatArray,
+    air_noise: FloatArray,
+    rows: FloatArray,
 ) -> int:
     """Fly frames with the built-in pilot (or the held command) until the rows are full or the flight ends.
 
@@ -380,7 +484,8 @@ def run_frames(
         tables: The simulation.
         state: Its state, updated in place.
         scratch: Work space.
-        noise: Standard normals, one row per frame; shape (frames, 0) where the noise is off.
+        noise: Standard normals of the pilot, one row per frame; shape (frames, 0) where the noise is off.
+        air_noise: Standard normals of the air, one row per frame; shape (frames, 0) without turbulence.
         rows: Written: the frame rows, shape (frames, signals).
 
     Returns:
@@ -397,7 +502,7 @@ def run_frames(
             command[0] = state.u[INPUT.stick]
             command[1] = state.u[INPUT.lever]
             command[2] = 0.0
-        advance(tables, state, scratch, rows[k], (command, command, noise[k]))
+        advance(tables, state, scratch, rows[k], (command, command, noise[k], air_noise[k]))
     return rows.shape[0]
 
 
@@ -413,5 +518,5 @@ def engage_pilot(tables: SimulationTables, state: SimulationState, scratch: Scra
     scratch.command[0] = state.u[INPUT.stick]
     scratch.command[1] = state.u[INPUT.lever]
     mocm_engage(
-        tables.pilot, state.pilot, state.x, scratch.motion[0], scratch.motion[1], scratch.target, scratch.command
+        tables.pilot, state.pilot, scratch.seen, scratch.motion[0], scratch.motion[1], scratch.target, scratch.command
     )

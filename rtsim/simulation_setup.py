@@ -12,9 +12,11 @@ from rtsim.aids import AidName, design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
+from rtsim.atmosphere import AirSpecification, new_gust_state
 from rtsim.corridor import load_corridor
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
 from rtsim.errors import InputError
+from rtsim.faults import Fault, fault_tables, new_fault_state
 from rtsim.frame import FloatArray
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.lpv_kernels import work_size
@@ -61,6 +63,10 @@ class FlightSetup:
     """Let the MOCM's observation and motor noise act."""
     aids: tuple[AidName, ...] = ()
     """Pilot aids on at frame 0; they act on every pilot but the MOCM."""
+    air: AirSpecification = AirSpecification()
+    """Gusts and turbulence."""
+    faults: tuple[Fault, ...] = ()
+    """Failures and their times."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +133,8 @@ def build_parts(setup: FlightSetup) -> Parts:
         corridor=load_corridor(setup.corridor).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
         aids=design_aids(database),
+        gusts=setup.air.tables(),
+        faults=fault_tables(setup.faults),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         reference_frequency=REFERENCE_FREQUENCY,
     )
@@ -139,10 +147,14 @@ def build_parts(setup: FlightSetup) -> Parts:
         path=np.zeros((3, 3)),
         motion=np.zeros(3),
         margins=np.zeros(MARGIN_COUNT),
+        shown=np.zeros(1 + MARGIN_COUNT),
+        seen=np.zeros(states),
         target=np.zeros(kernels.TARGET_SIZE),
         command=np.zeros(3),
         hands=np.zeros(2),
         asked=np.zeros(3),
+        planned=np.zeros(3),
+        gust=np.zeros(3),
     )
     return Parts(
         tables=tables,
@@ -154,12 +166,13 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
-def start_state(setup: FlightSetup, parts: Parts) -> kernels.SimulationState:
+def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> kernels.SimulationState:
     """The state at frame 0: trimmed, filters at rest, the pilot engaged without a step.
 
     Args:
         setup: The flight.
         parts: Its parts.
+        air_normals: Three standard normals: the turbulence at the start.
     """
     airspeed, nacelle, _ = _start(setup)
     clock = np.zeros(kernels.CLOCK_SIZE)
@@ -175,10 +188,13 @@ def start_state(setup: FlightSetup, parts: Parts) -> kernels.SimulationState:
         pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
         aids=np.zeros(AID_STATE_SIZE),
         switches=switches_of(setup.aids),
+        gusts=new_gust_state(setup.air, air_normals),
+        faults=new_fault_state(),
         clock=clock,
     )
     if setup.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
+    kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))
     row = np.zeros(len(kernels.COLUMN))
     kernels.observe(parts.tables, state, parts.scratch, row)
     kernels.engage_pilot(parts.tables, state, parts.scratch)
