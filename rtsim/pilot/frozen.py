@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +26,7 @@ from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.tables import load_pilot_tables
 
 _STEP = 1e-5
-_SETTLE_STEPS = 3
+"""Step of the numerical derivatives, for every state and control (SI, radians)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,12 +189,10 @@ def frozen_loop(
     frame = _Frame(database, lpv, pilot, condition, dt)
     x, u = _trim_state(database, condition)
     state = np.zeros(kernels.pilot_state_size(pilot))
-    present = u[frame.hands]
-    if condition.acceleration == 0.0:
-        x, state = _settled(frame, x, state, present)
-    else:
-        kernels.mocm_engage(pilot, state, x, condition.nacelle_angle, 0.0, frame.reference, present)
-        present = frame.output(x, state)
+    # Between grid points the trims of aircraft and pilot come from the same tables and agree to second order of the
+    # cell; on an accelerated layer the point is none of rest, and the map's derivative there is what is wanted.
+    kernels.mocm_engage(pilot, state, x, condition.nacelle_angle, 0.0, frame.reference, u[frame.hands])
+    present = frame.output(x, state)
     step_x, step_u = np.full(x.size, _STEP), np.full(present.size, _STEP)
     step_s = np.full(state.size, _STEP)
     return FrozenLoop(
@@ -209,26 +206,8 @@ def frozen_loop(
     )
 
 
-def _settled(frame: _Frame, x: FloatArray, state: FloatArray, present: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Engage at the trim; interpolated trims of aircraft and pilot agree there to second order of the cell."""
-    kernels.mocm_engage(frame.pilot, state, x, frame.nacelle, 0.0, frame.reference, present)
-    return x, state
-
-
-@lru_cache(maxsize=4)
-def _cached_tables(
-    content: str, outer_loop: OuterLoop, dt: float, form: Form
-) -> dict[str, tuple[LpvTables, PilotTables]]:
-    del content, outer_loop, dt, form
-    return {}
-
-
 def _tables(database: Database, outer_loop: OuterLoop, dt: float, form: Form) -> tuple[LpvTables, PilotTables]:
-    """Tables of a database, kept for the next call."""
-    kept = _cached_tables(database.content_hash, outer_loop, dt, form)
-    if "tables" not in kept:
-        kept["tables"] = (prepare_tables(database, form), load_pilot_tables(database, outer_loop, dt=dt))
-    return kept["tables"]
+    return prepare_tables(database, form), load_pilot_tables(database, outer_loop, dt=dt)
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,7 +73,17 @@ from rtsim.pilot.layout_kernels import (
     plant_reference,
 )
 
-__all__ = ["PilotTables", "mocm_advance", "mocm_engage", "mocm_output", "noise_width", "pilot_state_size"]
+__all__ = [
+    "PilotTables",
+    "mocm_advance",
+    "mocm_advance_in",
+    "mocm_engage",
+    "mocm_output",
+    "mocm_output_in",
+    "noise_width",
+    "pilot_state_size",
+    "pilot_work_size",
+]
 
 
 @kernel
@@ -103,11 +113,11 @@ def mocm_output(
         out: Receives stick (-1..1) and lever (0..1).
     """
     work = np.empty(4 * (1 + tables.roles[R_HANDS]) + OFFSETS)
-    _output(tables, state, nacelle_angle, reference, out, work)
+    mocm_output_in(tables, state, nacelle_angle, reference, out, work)
 
 
 @inner_kernel
-def _output(
+def mocm_output_in(
     tables: PilotTables,
     state: FloatArray,
     nacelle_angle: float,
@@ -115,6 +125,16 @@ def _output(
     out: FloatArray,
     work: FloatArray,
 ) -> None:
+    """`mocm_output` in given work space.
+
+    Args:
+        tables: Prepared pilot.
+        state: The pilot's state.
+        nacelle_angle: Nacelle angle [rad].
+        reference: What is asked for, see the module.
+        out: Receives stick (-1..1) and lever (0..1).
+        work: Scratch of `pilot_work_size(tables)` numbers.
+    """
     own = work[4 * (1 + tables.roles[R_HANDS]) :]
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, work)
@@ -199,15 +219,28 @@ def mocm_advance(
         noise: Standard normals, `noise_width` of them, or none: noise off.
         dt: Length of the frame [s].
     """
-    roles = tables.roles
-    hands = roles[R_HANDS]
-    fixed = 4 * (1 + hands) + OFFSETS + roles[R_PLANT] + roles[R_END] + pad4(roles[R_DISPLAYS]) + hands
-    work = np.zeros(fixed + held_size(tables) + 3 * motion_size(tables))
-    _advance(tables, state, x, (nacelle_angle, nacelle_rate, dt), reference, applied, noise, work)
+    work = np.empty(pilot_work_size(tables))
+    mocm_advance_in(tables, state, x, (nacelle_angle, nacelle_rate, dt), reference, applied, noise, work)
 
 
 @inner_kernel
-def _advance(
+def pilot_work_size(tables: PilotTables) -> int:
+    """Length of the work array that `mocm_output_in` and `mocm_advance_in` need.
+
+    Args:
+        tables: Prepared pilot.
+
+    Returns:
+        The number of float64 values.
+    """
+    roles = tables.roles
+    hands = roles[R_HANDS]
+    fixed = 4 * (1 + hands) + OFFSETS + roles[R_PLANT] + roles[R_END] + pad4(roles[R_DISPLAYS]) + hands
+    return fixed + held_size(tables) + 3 * motion_size(tables)
+
+
+@inner_kernel
+def mocm_advance_in(
     tables: PilotTables,
     state: FloatArray,
     x: FloatArray,
@@ -217,7 +250,20 @@ def _advance(
     noise: FloatArray,
     work: FloatArray,
 ) -> None:
-    """`mocm_advance` in given work space. Counting references to its many views would cost more than the arithmetic."""
+    """`mocm_advance` in given work space. Counting references to its many views would cost more than the arithmetic.
+
+    Args:
+        tables: Prepared pilot.
+        state: The pilot's state, updated in place.
+        x: Aircraft state at the start of the frame.
+        scalars: Nacelle angle [rad] and rate [rad/s], length of the frame [s].
+        reference: What is asked for, see the module.
+        applied: Stick and lever that act during the frame.
+        noise: Standard normals, or none.
+        work: Scratch of `pilot_work_size(tables)` numbers.
+    """
+    for k in range(work.shape[0]):
+        work[k] = 0.0
     nacelle_angle, nacelle_rate, dt = scalars
     roles = tables.roles
     n = roles[R_PLANT]
