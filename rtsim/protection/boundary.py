@@ -12,7 +12,7 @@ from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.variables import required_position
-from rtsim.protection.law_kernels import torque_limit
+from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import Limits, load_limits
 from rtsim.units import deg, to_deg, to_kt
 
@@ -23,7 +23,7 @@ MODEL_PITCH = deg(15.0)
 """Nose-up attitude of a level trim at which the computed low-speed side begins; the design chart's is 12 to 16 deg."""
 NO_LIMIT = 1e6
 """Stands for a speed without limit where lines are interpolated [m/s]."""
-_SAMPLES = deg(0.5) * np.arange(191)
+_TRIMS = "level trims of the LPV database"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,8 @@ class Inconsistency:
         """Say it for people."""
         what = "stall or attitude" if self.side == "low" else "mast torque or trim"
         return (
-            f"the chart's {self.side}-speed side lies up to {to_kt(self.depth):.1f} kn outside the plant's {what} limit, "
-            f"worst at nacelle {to_deg(self.nacelle_deepest):.0f} deg ({to_deg(self.nacelle_from):.0f} to "
+            f"the chart's {self.side}-speed side lies up to {to_kt(self.depth):.1f} kn outside the plant's {what} "
+            f"limit, worst at nacelle {to_deg(self.nacelle_deepest):.0f} deg ({to_deg(self.nacelle_from):.0f} to "
             f"{to_deg(self.nacelle_to):.0f} deg)"
         )
 
@@ -83,10 +83,15 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
         published,
         name="model",
         title="Computed corridor (level trims: stall or attitude, mast torque)",
-        low=Boundary(database.nacelle, np.minimum.accumulate(low), "stall or attitude", "level trims of the LPV database"),
-        high=Boundary(database.nacelle, np.minimum.accumulate(high), "mast torque or end of the trims", "level trims of the LPV database"),
+        low=Boundary(database.nacelle, np.minimum.accumulate(low), "stall or attitude", _TRIMS),
+        high=Boundary(database.nacelle, np.minimum.accumulate(high), "mast torque or end of the trims", _TRIMS),
         downstop_speed=min(downstop, published.downstop_speed),
     )
+
+
+def _samples() -> FloatArray:
+    """Nacelle angles at which lines are compared [rad]."""
+    return np.asarray(deg(0.5) * np.arange(191))
 
 
 def _crossing(speeds: FloatArray, spare: FloatArray) -> float:
@@ -127,16 +132,14 @@ def guarded_corridor(corridor: Corridor, database: Database, guard: float) -> Co
         A corridor whose sides are the nearer of the chart and the plant's line less the guard.
     """
     slowest, fastest = trim_range(database)
-    angles = np.union1d(_SAMPLES, np.concatenate([corridor.low.nacelle, corridor.high.nacelle]))
+    angles = np.union1d(_samples(), np.concatenate([corridor.low.nacelle, corridor.high.nacelle]))
     low = np.maximum(np.asarray(corridor.low.at(angles)), np.interp(angles, database.nacelle, slowest) + guard)
     high = np.minimum(np.asarray(corridor.high.at(angles)), np.interp(angles, database.nacelle, fastest) - guard)
     note = f"; not beyond the plant's level trims less {to_kt(guard):g} kn"
     # Nowhere rising with the nacelle angle, as every boundary: the stricter side of a wiggle holds.
     return replace(
         corridor,
-        low=Boundary(
-            angles, np.maximum.accumulate(low[::-1])[::-1], corridor.low.kind, corridor.low.source + note
-        ),
+        low=Boundary(angles, np.maximum.accumulate(low[::-1])[::-1], corridor.low.kind, corridor.low.source + note),
         high=Boundary(angles, np.minimum.accumulate(high), corridor.high.kind, corridor.high.source + note),
     )
 
@@ -165,9 +168,7 @@ def trim_range(database: Database) -> tuple[FloatArray, FloatArray]:
     return slowest, fastest
 
 
-def check_consistency(
-    corridor: Corridor, database: Database, *, tolerance: float = 0.5
-) -> tuple[Inconsistency, ...]:
+def check_consistency(corridor: Corridor, database: Database, *, tolerance: float = 0.5) -> tuple[Inconsistency, ...]:
     """Find where a chart allows what the plant cannot trim within its limits.
 
     Args:
@@ -176,7 +177,8 @@ def check_consistency(
         tolerance: Distances below this are agreement [m/s].
     """
     plant = model_corridor(database)
-    angles = _SAMPLES[(_SAMPLES > corridor.downstop_nacelle) & (_SAMPLES <= database.nacelle[-1] + 1e-9)]
+    angles = _samples()
+    angles = angles[(angles > corridor.downstop_nacelle) & (angles <= database.nacelle[-1] + 1e-9)]
     # Rearward flight is an allowance of the chart's side, not a limit of the plant.
     forward = np.asarray(corridor.low.at(angles)) > 0.0
     low = np.where(forward, np.asarray(plant.low.at(angles)) - np.asarray(corridor.low.at(angles)), -np.inf)

@@ -9,7 +9,7 @@ from functools import cache
 from importlib import resources
 from typing import Any, Literal
 
-from rtsim.protection.law_kernels import LawSettings, TorqueTables
+from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
 from rtsim.units import INCH_POUND, deg, kt
 
@@ -50,6 +50,8 @@ class Limits:
     """Gimbal flapping at the stop [rad]."""
     torque: TorqueTables
     """Mast torque."""
+    sink: SinkTables
+    """Sink rate."""
     load_factor_max: float
     """Largest load factor."""
     load_factor_min: float
@@ -84,6 +86,12 @@ def load_limits() -> Limits:
             takeoff=data["mast_torque_takeoff_inlb"] * INCH_POUND,
             takeoff_nacelle=deg(data["takeoff_nacelle_above_deg"]),
             takeoff_airspeed=kt(data["takeoff_airspeed_below_kt"]),
+        ),
+        sink=SinkTables(
+            floor=data["sink_rate_m_s"],
+            slope=math.sin(deg(data["sink_angle_deg"])),
+            height=data["sink_height_m"],
+            time=data["sink_time_s"],
         ),
         load_factor_max=data["load_factor_max"],
         load_factor_min=data["load_factor_min"],
@@ -139,11 +147,8 @@ def load_settings(*, dt: float) -> LawSettings:
         recovery_step=kt(full["recovery_step_kt"]),
         height_floor=full["height_floor_m"],
         height_full=full["height_full_m"],
-        sink_slope=math.sin(deg(full["sink_angle_deg"])),
+        sink_slope=math.sin(deg(data["limits"]["sink_angle_deg"])),
         sink_floor=full["sink_rate_floor_m_s"],
-        sink_limit=full["sink_limit_m_s"],
-        sink_height=full["sink_height_m"],
-        sink_time=full["sink_time_s"],
         flapping=deg(full["flapping_deg"]),
         torque_share=full["torque_share"],
         torque_lead=full["torque_lead_s"],

@@ -1,8 +1,8 @@
 """Compiled prediction: where airspeed and nacelle angle go if the controls stay as they are.
 
-The model is the rigid body (u, w, q, pitch) with the rotor and the actuators settled, linear aerodynamics about the trim
-of the present airspeed and nacelle angle, and exact gravity and Coriolis terms; the nacelles follow their filter exactly.
-What the model's acceleration misses now is carried along and dies away.
+The model is the rigid body (u, w, q, pitch) with the rotor and the actuators settled, linear aerodynamics about the
+trim of the present airspeed and nacelle angle, and exact gravity and Coriolis terms; the nacelles follow their filter
+exactly. What the model's acceleration misses now is carried along and dies away.
 
 Legend: z = (u, w, q, pitch); c = (stick, lever); V horizontal airspeed; n nacelle angle; r nacelle command rate.
 """
@@ -149,7 +149,7 @@ def affine(
         controls: Stick and lever.
         rate: Nacelle rate [rad/s].
     """
-    return (
+    return float(
         cell[place]
         + cell[place + 1] * (z[0] - cell[C_STATE])
         + cell[place + 2] * (z[1] - cell[C_STATE + 1])

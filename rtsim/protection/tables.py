@@ -10,7 +10,7 @@ from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.protection.boundary import BoundaryName, guarded_corridor, load_boundary
-from rtsim.protection.law_kernels import LawSettings, ProtectionTables
+from rtsim.protection.law_data import LawSettings, ProtectionTables
 from rtsim.protection.limits import frames_per_decision, load_limits, load_settings, load_weights
 from rtsim.protection.model import reduce_model
 from rtsim.protection.prediction_kernels import BoundaryTables
@@ -55,6 +55,7 @@ def law_tables(
         model=reduce_model(database, load_weights()),
         corridor=sample_boundary(corridor),
         torque=limits.torque,
+        sink=limits.sink,
         settings=load_settings(dt=dt) if settings is None else settings,
     )
 
@@ -65,7 +66,7 @@ def sample_boundary(corridor: Corridor) -> BoundaryTables:
     Args:
         corridor: The boundaries.
     """
-    angles = deg(SPACING_DEG) * np.arange(round(95.0 / SPACING_DEG) + 1)
+    angles = np.asarray(deg(SPACING_DEG) * np.arange(round(95.0 / SPACING_DEG) + 1), dtype=np.float64)
     low, high = np.asarray(corridor.low.at(angles)), np.asarray(corridor.high.at(angles))
     low.setflags(write=False)
     high.setflags(write=False)

@@ -1,0 +1,225 @@
+"""A chain of laws in one flight: asked 50 times a second in order, held in between, each guarded.
+
+Priority is the order: the last law has the last word, and the record says who changed what. A channel that the chain
+left as it was follows the pilot in every frame; one that it changed keeps the limited value until the next decision.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.protection.guard import Failure, GuardedAnswer, guarded_call
+from rtsim.protection.laws import LawSpec
+from rtsim.protection.limits import frames_per_decision
+
+BATCH_LIMIT = 1.0
+"""Wall time of one call after which a law is ended in a batch [s]."""
+LIVE_LIMIT = 0.25
+"""The same in a live flight, where the loop waits meanwhile [s]."""
+EventKind = Literal["raised", "not_finite", "wrong_answer", "interrupted", "skipped", "global_state"]
+
+
+@dataclass(frozen=True, slots=True)
+class LawEvent:
+    """Something a law did besides its work."""
+
+    frame: int
+    """Frame in which."""
+    law: str
+    """Name of the law."""
+    kind: EventKind
+    """What."""
+    text: str
+    """A sentence for people."""
+    ended: bool
+    """The law acts no more in this flight."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChainedIntervention:
+    """An intervention and the law that made it."""
+
+    frame: int
+    """Frame in which."""
+    law: str
+    """Name of the law."""
+    intervention: Intervention
+    """What it did."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Call:
+    """One call as it was made, to make it again."""
+
+    sensors: Sensors
+    command: Command
+    margins: Margins
+    answer: Command
+
+
+class LawChain:
+    """The laws of one flight."""
+
+    def __init__(
+        self,
+        laws: Sequence[LawSpec],
+        *,
+        dt: float,
+        live: bool = False,
+        skip: Collection[tuple[int, str]] = (),
+        end: Collection[tuple[int, str]] = (),
+        on_event: Callable[[LawEvent], None] | None = None,
+        remember: bool = False,
+    ) -> None:
+        """Make a fresh instance of every law.
+
+        Args:
+            laws: The laws in the order in which they act.
+            dt: Length of a frame [s].
+            live: The flight runs against the clock: calls that took too long are followed by skipped ones. A batch
+                never skips, so that its commands do not depend on the machine.
+            skip: Calls to skip as (frame, law), from the record of a live flight that is replayed.
+            end: Frames in which laws were ended, (frame, law), from the same record.
+            on_event: Told about every event.
+            remember: Keep all calls, for ``unrepeatable``.
+
+        Raises:
+            InputError: A law cannot be made.
+        """
+        self.every = frames_per_decision(dt)
+        self.period = self.every * dt
+        self.events: list[LawEvent] = []
+        """What happened besides limiting."""
+        self.interventions: tuple[ChainedIntervention, ...] = ()
+        """What the laws say they did in the last decision."""
+        self._specs = tuple(laws)
+        self._laws: list[ProtectionLaw | None] = [spec.make() for spec in laws]
+        self._live, self._on_event, self._remember = live, on_event, remember
+        self._skip, self._end = frozenset(skip), frozenset(end)
+        self._waiting = [0] * len(self._specs)
+        self._calls: list[list[_Call]] = [[] for _ in self._specs]
+        self._held: list[float | None] = [None, None, None]
+
+    def due(self, frame: int) -> bool:
+        """Whether the laws decide in this frame, and so need sensors and margins.
+
+        Args:
+            frame: Number of the frame.
+        """
+        return frame % self.every == 0
+
+    def decide(self, frame: int, sensors: Sensors, command: Command, margins: Margins) -> None:
+        """Ask every law in turn.
+
+        Args:
+            frame: Number of the frame.
+            sensors: What the laws may know.
+            command: The command before protection.
+            margins: Distances to the corridor's boundaries.
+        """
+        limited = command
+        noted: list[ChainedIntervention] = []
+        for place, spec in enumerate(self._specs):
+            answer = self._ask(frame, place, sensors, limited, margins)
+            if answer is None or answer.command is None:
+                continue
+            limited = answer.command
+            noted += [ChainedIntervention(frame, spec.name, item) for item in answer.interventions]
+        self.interventions = tuple(noted)
+        pairs = zip(_values(command), _values(limited), strict=True)
+        self._held = [None if after == before else after for before, after in pairs]
+
+    def apply(self, command: Command) -> Command:
+        """Limit this frame's command by what was decided last.
+
+        Args:
+            command: The command before protection.
+        """
+        if self._held == [None, None, None]:
+            return command
+        held = zip(_values(command), self._held, strict=True)
+        return Command(*(before if after is None else after for before, after in held))
+
+    def unrepeatable(self) -> list[LawEvent]:
+        """Make all calls again with fresh instances and name the laws that answer otherwise.
+
+        A law whose answers depend on anything but what it is given and its own instance (module variables, class
+        variables, clocks, random numbers without a seed) makes a flight that cannot be repeated.
+
+        Returns:
+            One event for each such law.
+        """
+        found = []
+        for place, spec in enumerate(self._specs):
+            if spec.built_in or not self._calls[place]:
+                continue
+            fresh = spec.make()
+            for number, call in enumerate(self._calls[place]):
+                again = guarded_call(fresh, call.sensors, call.command, call.margins, dt=self.period, limit=BATCH_LIMIT)
+                if again.command != call.answer:
+                    text = (
+                        f"the law {spec.name} keeps state outside its instance: asked again with the same values, its "
+                        f"call number {number} (time {call.sensors.time:.2f} s) answered "
+                        f"{again.command if again.command is not None else again.text} instead of {call.answer}"
+                    )
+                    frame = round(call.sensors.time / self.period) * self.every
+                    found.append(LawEvent(frame, spec.name, "global_state", text, False))
+                    break
+        for event in found:
+            self._tell(event)
+        return found
+
+    def _ask(
+        self, frame: int, place: int, sensors: Sensors, command: Command, margins: Margins
+    ) -> GuardedAnswer | None:
+        law, name = self._laws[place], self._specs[place].name
+        if law is not None and (frame, name) in self._end:
+            self._laws[place] = law = None
+        if law is None:
+            return None
+        if (frame, name) in self._skip:
+            return None
+        if self._waiting[place] > 0:
+            self._waiting[place] -= 1
+            text = f"the law {name} was skipped: its last call took too long"
+            self._tell(LawEvent(frame, name, "skipped", text, False))
+            return None
+        limit = LIVE_LIMIT if self._live else BATCH_LIMIT
+        answer = guarded_call(law, sensors, command, margins, dt=self.period, limit=limit)
+        if answer.failure is not None:
+            self._laws[place] = None
+            self._fail(frame, name, answer.failure, answer.text)
+            return None
+        if self._live and answer.duration > self.period:
+            self._waiting[place] = math.ceil(answer.duration / self.period) - 1
+        if self._remember and answer.command is not None:
+            self._calls[place].append(_Call(sensors, command, margins, answer.command))
+        return answer
+
+    def _fail(self, frame: int, name: str, kind: Failure, text: str) -> None:
+        sentence = f"the law {name} {text}; the flight goes on without it"
+        self._tell(LawEvent(frame, name, kind, sentence, True))
+
+    def _tell(self, event: LawEvent) -> None:
+        self.events.append(event)
+        if self._on_event is not None:
+            self._on_event(event)
+
+
+def _values(command: Command) -> tuple[float, float, float]:
+    return command.stick, command.lever, command.nacelle_rate
+
+
+def compiled_law(laws: Sequence[LawSpec]) -> str | None:
+    """Name of the built-in law that a chain amounts to, or None where laws in Python have to be called.
+
+    Args:
+        laws: The chain.
+    """
+    if not laws:
+        return "off"
+    return laws[0].name if len(laws) == 1 and laws[0].built_in else None

@@ -1,0 +1,156 @@
+"""What the compiled laws are made of: places in their arrays, reasons, and the tuples of their numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rtsim.protection.prediction_kernels import CELL_SIZE, ROLL_OUT_SIZE, BoundaryTables, ModelTables
+
+LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
+
+# Places in the sensor array, the order of rtsim.command.Sensors. SI and radians, booleans as 0 and 1.
+SENSE_TIME, SENSE_AIRSPEED, SENSE_AIRSPEED_RATE, SENSE_NACELLE, SENSE_NACELLE_RATE = 0, 1, 2, 3, 4
+SENSE_PITCH, SENSE_PITCH_RATE, SENSE_FLIGHT_PATH, SENSE_ALTITUDE, SENSE_CLIMB_RATE = 5, 6, 7, 8, 9
+SENSE_LOAD_FACTOR, SENSE_TORQUE, SENSE_FLAPPING, SENSE_DOWNSTOP, SENSE_NACELLE_OK = 10, 11, 12, 13, 14
+SENSOR_COUNT = 15
+
+# Reasons, as recorded: 0 none, else one more than the number of the limit in rtsim.protection.limits.LIMIT_KINDS.
+REASON_NONE, REASON_LOW, REASON_HIGH, REASON_GATE = 0, 1, 2, 3
+REASON_FLAP, REASON_TORQUE, REASON_PITCH, REASON_SINK = 6, 7, 9, 11
+
+# Places in the law's state: what is allowed now ...
+L_BLEND, L_STICK, L_LEVER = 0, 1, 2
+L_STICK_LOW, L_STICK_HIGH, L_LEVER_LOW, L_LEVER_HIGH, L_RATE_LOW, L_RATE_HIGH = 3, 4, 5, 6, 7, 8
+L_BLEND_REASON, L_STICK_LOW_REASON, L_STICK_HIGH_REASON, L_LEVER_REASON, L_RATE_REASON = 9, 10, 11, 12, 13
+L_TIME, L_SIDE = 14, 15
+"""Time to the corridor's boundary with the controls as they are [s], and its side (-1 low, 1 high, 0 none)."""
+L_MARGIN = 16
+"""Least margin predicted with the pilot's controls [m/s]."""
+# ... what acted last, set by law_apply ...
+L_ACTED, L_ACTED_STICK, L_ACTED_LEVER, L_ACTED_RATE = 17, 18, 19, 20
+L_STICK_CAUSE, L_LEVER_CAUSE, L_RATE_CAUSE = 21, 22, 23
+"""Reason for the change of each channel in this frame; 0 where there was none."""
+# ... and memory from one decision to the next.
+L_STARTED, L_BIAS, L_LAST_NACELLE_RATE, L_LAST_TORQUE, L_TORQUE_RATE, L_COLLECTIVE = 24, 25, 26, 27, 28, 29
+L_FLAP_BIAS, L_RECOVER_SIDE, L_OVERRIDE, L_KIND = 30, 31, 32, 33
+"""L_OVERRIDE 1: the pilot has switched the law's authority off. L_KIND: how the nacelle rate was limited (0 limit,
+1 reverse)."""
+LAW_STATE_SIZE = 34
+
+FREE = 1e9
+"""A bound that bounds nothing."""
+CHANGE_STICK, CHANGE_LEVER, CHANGE_RATE = 1e-4, 1e-4, 1e-5
+"""Changes smaller than these are rounding, not interventions [-, -, rad/s]."""
+
+WORK_SIZE = 2 * CELL_SIZE + ROLL_OUT_SIZE
+"""Length of the scratch array of the laws."""
+
+
+class LawSettings(NamedTuple):
+    """Numbers of the laws, from ``data/protection.toml``. SI and radians."""
+
+    period: float
+    """Time between decisions [s]."""
+    horizon: float
+    """How far the laws look ahead [s]."""
+    step: float
+    """Step of that prediction [s]."""
+    warning_horizon: float
+    """How far the time to limit looks ahead [s]."""
+    warning_step: float
+    """Step of that prediction [s]."""
+    bias_filter: float
+    """Time constant with which the model's missing acceleration is learned [s]."""
+    bias_decay: float
+    """Time constant with which it is taken to die away [s]."""
+    bias_limit: float
+    """Largest missing acceleration taken into account [m/s^2]."""
+    reverse_margin: float
+    """Governor: predicted margin below which the nacelles are turned back [m/s]."""
+    pass_margin: float
+    """Governor: predicted margin with which a rate passes [m/s]."""
+    apply: float
+    """Governor: how long a rate is tried before the nacelles are stopped [s]."""
+    reverse_rate: float
+    """Governor: fastest rate at which the nacelles are turned back [rad/s]."""
+    flat_high_nacelle: float
+    """Governor: below this angle nacelle motion does not move the high-speed side [rad]."""
+    finish_nacelle: float
+    """Governor: from here forward the nacelles are run on to the downstop [rad]."""
+    blend_begin: float
+    """Full: predicted margin below which the recovery blends in [m/s]."""
+    blend_full: float
+    """Full: predicted margin at which it has taken over [m/s]."""
+    blend_rise: float
+    """Full: fastest growth of the blend [1/s]."""
+    blend_fall: float
+    """Full: fastest decay of the blend [1/s]."""
+    recovery_margin: float
+    """Full: margin the recovery aims at [m/s]."""
+    recovery_step: float
+    """Full: largest change of airspeed the recovery aims at [m/s]."""
+    height_floor: float
+    """Full: below this height stick and lever are not taken from the pilot [m]."""
+    height_full: float
+    """Full: from this height on they may be taken in full [m]."""
+    sink_slope: float
+    """Full: sine of the steepest descent the recovery may use."""
+    sink_floor: float
+    """Full: sink rate always allowed to the recovery [m/s]."""
+    flapping: float
+    """Full: flapping kept to [rad]."""
+    torque_share: float
+    """Full: share of the torque limit kept to."""
+    torque_lead: float
+    """Full: how far the torque is extrapolated [s]."""
+    collective_lag: float
+    """Full: time constant of the collective actuator [s]."""
+    pitch: float
+    """Full: pitch attitude kept to [rad]."""
+    pitch_frequency: float
+    """Full: how sharply pitch may approach it [rad/s]."""
+
+
+class TorqueTables(NamedTuple):
+    """The mast-torque limit. SI and radians."""
+
+    cruise: float
+    """Limit in conversion and airplane mode [N m]."""
+    takeoff: float
+    """Limit in helicopter mode at low speed [N m]."""
+    takeoff_nacelle: float
+    """Nacelle angle above which the latter holds [rad]."""
+    takeoff_airspeed: float
+    """Airspeed below which it holds [m/s]."""
+
+
+class SinkTables(NamedTuple):
+    """The sink rate a pilot may fly. SI and radians."""
+
+    floor: float
+    """Sink rate always allowed [m/s]."""
+    slope: float
+    """Sine of the descent angle always allowed."""
+    height: float
+    """Height above which more is allowed [m]."""
+    time: float
+    """Height above that, per sink rate allowed besides [s]."""
+
+
+class ProtectionTables(NamedTuple):
+    """One compiled law; read-only."""
+
+    law: int
+    """``LAW_*``."""
+    every: int
+    """Frames from one decision to the next."""
+    model: ModelTables
+    """The aircraft as the law knows it."""
+    corridor: BoundaryTables
+    """The boundaries it keeps to."""
+    torque: TorqueTables
+    """The torque it keeps to."""
+    sink: SinkTables
+    """The sink rate it keeps to."""
+    settings: LawSettings
+    """Its numbers."""

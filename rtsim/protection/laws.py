@@ -1,0 +1,304 @@
+"""Laws by name: the built-in ones as objects, and users' own by ``MODULE:CLASS`` or entry point."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import math
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.errors import InputError
+from rtsim.lpv.database import Database, load_database
+from rtsim.protection import law_data as data
+from rtsim.protection import law_kernels, limiter_kernels
+from rtsim.protection.boundary import BoundaryName
+from rtsim.protection.law_data import LawSettings
+from rtsim.protection.limits import LIMIT_KINDS, load_limits
+from rtsim.protection.monitor import sensor_array
+from rtsim.protection.tables import LAW_NAMES, law_tables
+
+ENTRY_POINT_GROUP = "rtsim.protection_laws"
+"""Group under which an installed package offers protection laws by name."""
+CHANNELS: tuple[Literal["stick", "lever", "nacelle_rate"], ...] = ("stick", "lever", "nacelle_rate")
+"""What a law may change, in the order of a command."""
+_CLIPS = (data.REASON_FLAP, data.REASON_PITCH, data.REASON_TORQUE)
+_WARNING_TIME = 5.0
+
+
+class BuiltInLaw:
+    """A built-in law in the form of ``rtsim.command.ProtectionLaw``."""
+
+    def __init__(
+        self,
+        law: str,
+        *,
+        boundary: BoundaryName = "flight",
+        database: Database | None = None,
+        settings: LawSettings | None = None,
+    ) -> None:
+        """Load the law.
+
+        Args:
+            law: ``off``, ``monitor``, ``governor`` or ``full``.
+            boundary: The corridor it keeps to.
+            database: The aircraft it knows; None: the shipped XV-15.
+            settings: Its numbers; None: those of ``data/protection.toml``.
+
+        Raises:
+            InputError: There is no such law.
+        """
+        self.name = law
+        self._boundary: BoundaryName = boundary
+        self._settings = settings
+        self._database = load_database() if database is None else database
+        self._tables = law_tables(law, self._database, dt=0.02, boundary=boundary, settings=settings)
+        self._dt = 0.02
+        self._frame = 0
+        self._state = np.zeros(data.LAW_STATE_SIZE)
+        self._work = np.zeros(data.WORK_SIZE)
+        self._applied = np.zeros(3)
+        law_kernels.law_start(self._tables, self._state)
+
+    @property
+    def time_to_limit(self) -> float:
+        """Predicted time until the corridor is left with the controls as they are; infinite where it is not [s]."""
+        return float(self._state[data.L_TIME]) if self._state[data.L_SIDE] != 0.0 else math.inf
+
+    def step(
+        self, sensors: Sensors, command: Command, margins: Margins, dt: float
+    ) -> tuple[Command, list[Intervention]]:
+        """Give the limited command and the interventions of this frame.
+
+        Args:
+            sensors: The aircraft as the law may know it.
+            command: The pilot's command of this frame.
+            margins: Not used: the law has its own boundaries.
+            dt: Time since the last call [s].
+        """
+        del margins
+        if dt != self._dt:
+            self._tables = law_tables(
+                self.name, self._database, dt=dt, boundary=self._boundary, settings=self._settings
+            )
+            self._dt = dt
+        asked = np.array([command.stick, command.lever, command.nacelle_rate])
+        known = sensor_array(sensors)
+        law_kernels.protect(self._tables, self._state, self._frame, known, asked, self._applied, self._work)
+        self._frame += 1
+        stick, lever, rate = (float(value) for value in self._applied)
+        return Command(stick, lever, rate), self._interventions(sensors, asked)
+
+    def _interventions(self, sensors: Sensors, asked: np.ndarray[tuple[int], Any]) -> list[Intervention]:
+        state = self._state
+        if self._tables.law == data.LAW_MONITOR:
+            return self._warnings(asked)
+        found = []
+        causes = (data.L_STICK_CAUSE, data.L_LEVER_CAUSE, data.L_RATE_CAUSE)
+        for place, (channel, cause) in enumerate(zip(CHANNELS, causes, strict=True)):
+            reason = int(state[cause])
+            if reason == data.REASON_NONE:
+                continue
+            kind: Literal["limit", "reverse", "blend", "clip"] = "clip" if reason in _CLIPS else "blend"
+            if channel == "nacelle_rate":
+                kind = "reverse" if state[data.L_KIND] != 0.0 else "limit"
+            found.append(
+                Intervention(
+                    limit=LIMIT_KINDS[reason - 1],
+                    channel=channel,
+                    kind=kind,
+                    before=float(asked[place]),
+                    after=float(self._applied[place]),
+                    margin=self._margin(reason, sensors),
+                    time_to_limit=self.time_to_limit,
+                )
+            )
+        return found
+
+    def _warnings(self, asked: np.ndarray[tuple[int], Any]) -> list[Intervention]:
+        """The monitor's only word: the corridor will be left soon."""
+        ahead = self.time_to_limit
+        if ahead >= _WARNING_TIME:
+            return []
+        rate = float(asked[2])
+        reason = data.REASON_LOW if self._state[data.L_SIDE] < 0.0 else data.REASON_HIGH
+        margin = float(self._state[data.L_MARGIN])
+        return [Intervention(LIMIT_KINDS[reason - 1], "nacelle_rate", "warn", rate, rate, margin, ahead)]
+
+    def _margin(self, reason: int, sensors: Sensors) -> float:
+        """Margin to the limit that asked for an intervention; the least predicted one for the corridor."""
+        limits = load_limits()
+        if reason == data.REASON_FLAP:
+            return limits.flapping - abs(sensors.flapping)
+        if reason == data.REASON_PITCH:
+            return limits.pitch - abs(sensors.pitch)
+        if reason == data.REASON_TORQUE:
+            bound = limiter_kernels.torque_limit(limits.torque, sensors.airspeed, sensors.nacelle_angle)
+            return float(1.0 - sensors.mast_torque / bound)
+        if reason == data.REASON_SINK:
+            return float(
+                limiter_kernels.allowed_sink(limits.sink, sensors.airspeed, sensors.altitude) + sensors.climb_rate
+            )
+        return float(self._state[data.L_MARGIN])
+
+
+@dataclass(frozen=True, slots=True)
+class LawSpec:
+    """A law by its name, found and ready to make; small and picklable, so that workers can make their own."""
+
+    name: str
+    """Built-in name, entry point or ``MODULE:CLASS``."""
+    boundary: BoundaryName = "flight"
+    """Corridor that a built-in law keeps to."""
+
+    @property
+    def built_in(self) -> bool:
+        """Whether it is one of the built-in laws."""
+        return self.name in LAW_NAMES
+
+    @property
+    def compiled_id(self) -> int | None:
+        """Number of a built-in law in compiled code; None for laws written in Python."""
+        return LAW_NAMES.index(self.name) if self.name in LAW_NAMES else None
+
+    def make(self) -> ProtectionLaw:
+        """Make a fresh law, as every flight begins with.
+
+        Raises:
+            InputError: There is no such law, or its class cannot be made.
+        """
+        if self.built_in:
+            return BuiltInLaw(self.name, boundary=self.boundary)
+        factory = _find(self.name)
+        try:
+            made: ProtectionLaw = factory()
+        except Exception as error:
+            raise InputError(
+                f"the law cannot be made: {type(error).__name__}: {error}",
+                key="protection",
+                value=self.name,
+                mend="its class must take no arguments",
+            ) from error
+        return made
+
+
+def load_law(name: str, *, boundary: BoundaryName = "flight") -> LawSpec:
+    """Find a law by name.
+
+    Args:
+        name: ``off``, ``monitor``, ``governor``, ``full``, the name of an entry point in the group
+            ``rtsim.protection_laws``, or ``MODULE:CLASS``; modules are also looked for in the current directory.
+        boundary: Corridor that a built-in law keeps to.
+
+    Returns:
+        The law; ``make()`` gives a fresh one for a flight, ``compiled_id`` its number for batches.
+
+    Raises:
+        InputError: There is no such law, or it has no method ``step``.
+    """
+    spec = LawSpec(name, boundary)
+    if not spec.built_in:
+        _find(name)
+    return spec
+
+
+def load_laws(names: str | Sequence[str], *, boundary: BoundaryName = "flight") -> tuple[LawSpec, ...]:
+    """Find a chain of laws.
+
+    Args:
+        names: The laws in the order in which they act, as a sequence or separated by commas.
+        boundary: Corridor that built-in laws keep to.
+
+    Returns:
+        The laws; ``off`` is left out of a chain of several.
+
+    Raises:
+        InputError: One of them is none.
+    """
+    listed = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
+    laws = tuple(load_law(name, boundary=boundary) for name in listed)
+    if len(laws) == 1:
+        return laws
+    return tuple(law for law in laws if law.name != "off")
+
+
+def _find(name: str) -> Callable[[], ProtectionLaw]:
+    target = _from_module(name) if ":" in name else _from_entry_point(name)
+    if not callable(target) or not callable(getattr(target, "step", None)):
+        raise InputError(
+            "is not a protection law: it is no class with a method step(sensors, command, margins, dt)",
+            key="protection",
+            value=name,
+            mend="see docs/protection.md",
+        )
+    return target  # type: ignore[no-any-return]
+
+
+def _from_module(name: str) -> Any:
+    module_name, _, class_name = name.partition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        missing = error.name or module_name
+        own = module_name == missing or module_name.startswith(f"{missing}.")
+        raise InputError(
+            f"there is no module {missing}" if own else f"its module needs {missing}, which is not installed",
+            key="protection",
+            value=name,
+            mend="name a module of the current directory or an installed one" if own else f"install {missing}",
+        ) from error
+    except Exception as error:
+        raise InputError(
+            f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
+            key="protection",
+            value=name,
+            mend="correct the module",
+        ) from error
+    target = getattr(module, class_name, None)
+    if target is None:
+        classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "step")]
+        raise InputError(
+            f"the module {module_name} has no class {class_name}",
+            key="protection",
+            value=name,
+            allowed=", ".join(classes) or None,
+            mend=_suggestion(class_name, classes, otherwise="name a class with a method step"),
+        )
+    return target
+
+
+def _from_entry_point(name: str) -> Any:
+    offered = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
+    if name not in offered:
+        choices = [*LAW_NAMES, *offered]
+        raise InputError(
+            "is not a protection law",
+            key="protection",
+            value=name,
+            allowed=", ".join([*choices, "MODULE:CLASS"]),
+            mend=_suggestion(name, choices, otherwise="choose one"),
+        )
+    try:
+        return offered[name].load()
+    except Exception as error:
+        raise InputError(
+            f"the entry point cannot be loaded: {type(error).__name__}: {error}",
+            key="protection",
+            value=name,
+            mend="reinstall the package that offers it",
+        ) from error
+
+
+def _suggestion(given: str, choices: Sequence[str], *, otherwise: str) -> str:
+    near = difflib.get_close_matches(given, choices, n=1)
+    return f"did you mean {near[0]}?" if near else otherwise

@@ -1,0 +1,359 @@
+"""Compiled parts of the laws: nacelle governor, recovery blend, and the limits of stick and lever.
+
+Legend: z = (u, w, q, pitch) from the sensors; c = (stick, lever); lam blend, 0 pilot to 1 recovery.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from rtsim.frame import FloatArray
+from rtsim.protection import prediction_kernels as model
+from rtsim.protection.law_data import (
+    FREE,
+    L_ACTED_LEVER,
+    L_BIAS,
+    L_BLEND,
+    L_BLEND_REASON,
+    L_COLLECTIVE,
+    L_FLAP_BIAS,
+    L_KIND,
+    L_LAST_TORQUE,
+    L_LEVER,
+    L_LEVER_HIGH,
+    L_LEVER_REASON,
+    L_MARGIN,
+    L_RATE_HIGH,
+    L_RATE_LOW,
+    L_RATE_REASON,
+    L_RECOVER_SIDE,
+    L_STARTED,
+    L_STICK,
+    L_STICK_HIGH,
+    L_STICK_HIGH_REASON,
+    L_STICK_LOW,
+    L_STICK_LOW_REASON,
+    L_TORQUE_RATE,
+    REASON_FLAP,
+    REASON_GATE,
+    REASON_HIGH,
+    REASON_LOW,
+    REASON_NONE,
+    REASON_PITCH,
+    REASON_SINK,
+    REASON_TORQUE,
+    ProtectionTables,
+    SinkTables,
+    TorqueTables,
+)
+from rtsim.protection.prediction_kernels import accelerations, affine, model_at, roll_out, speed_range
+
+
+@njit(cache=True, error_model="numpy")
+def torque_limit(tables: TorqueTables, airspeed: float, nacelle: float) -> float:
+    """Mast-torque limit at a condition [N m].
+
+    Args:
+        tables: The limits.
+        airspeed: Airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+    """
+    if nacelle > tables.takeoff_nacelle and airspeed < tables.takeoff_airspeed:
+        return tables.takeoff
+    return tables.cruise
+
+
+@njit(cache=True, error_model="numpy")
+def allowed_sink(tables: SinkTables, airspeed: float, altitude: float) -> float:
+    """Sink rate a pilot may fly [m/s].
+
+    Args:
+        tables: The limit.
+        airspeed: Airspeed [m/s].
+        altitude: Height above the ground [m].
+    """
+    above = max(0.0, altitude - tables.height) / tables.time
+    return max(tables.floor, tables.slope * abs(airspeed)) + above
+
+
+@njit(cache=True, error_model="numpy")
+def clip(value: float, low: float, high: float) -> float:
+    """Limit a value; the upper bound wins where bounds cross.
+
+    Args:
+        value: The value.
+        low: Lower bound.
+        high: Upper bound.
+    """
+    return min(max(value, low), high)
+
+
+@njit(cache=True, error_model="numpy")
+def govern(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    z: tuple[float, float, float, float],
+    controls: tuple[float, float],
+    nacelle: tuple[float, float, float],
+    pilot_rate: float,
+    out: FloatArray,
+) -> None:
+    """Bound the nacelle rate: turn back where even stopping leaves the corridor, else scale what the pilot asks for.
+
+    Args:
+        tables: The law.
+        state: Law state; its nacelle bounds are set.
+        cell: The model here.
+        z: u, w, q, pitch.
+        controls: Stick and lever taken to be held.
+        nacelle: Command angle, angle, rate [rad, rad, rad/s].
+        pilot_rate: Nacelle rate asked for [rad/s].
+        out: Scratch of ROLL_OUT_SIZE numbers.
+    """
+    settings = tables.settings
+    bias = (state[L_BIAS], settings.bias_decay)
+    time = (settings.step, settings.horizon)
+    guard = (settings.pitch, settings.pitch_frequency)
+    state[L_RATE_LOW], state[L_RATE_HIGH] = -FREE, FREE
+    state[L_KIND] = 0.0
+    roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, (0.0, 0.0), bias, time, guard, out)
+    stopped = min(out[model.OUT_LOW], out[model.OUT_HIGH])
+    state[L_MARGIN] = stopped
+    stopped_low, stopped_high = out[model.OUT_LOW], out[model.OUT_HIGH]
+    ends = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
+    angle = nacelle[1]
+    gated = angle <= tables.corridor.downstop_nacelle
+    if stopped < settings.reverse_margin:
+        low_side = stopped_low < stopped_high
+        state[L_RATE_REASON] = REASON_LOW if low_side else REASON_HIGH
+        state[L_KIND] = 1.0
+        if not low_side and settings.finish_nacelle < angle <= settings.flat_high_nacelle:
+            state[L_RATE_HIGH] = 0.0
+            state[L_KIND] = 0.0
+            return
+        back = settings.reverse_rate if low_side else -settings.reverse_rate
+        if not low_side and angle <= settings.finish_nacelle:
+            state[L_RATE_HIGH] = back
+            return
+        roll_out(
+            tables.model, tables.corridor, cell, z, controls, nacelle, (back, settings.horizon), bias, time, guard, out
+        )
+        turned = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
+        # Aft is the way out on the low side and forward on the high side even where the nacelles' own pull or drag
+        # costs margin at first: only a turn that is seen to suffice may be slower than the fastest.
+        share = 1.0
+        if turned > settings.reverse_margin:
+            share = clip((settings.reverse_margin - ends) / (turned - ends), 0.25, 1.0)
+        if low_side:
+            state[L_RATE_LOW] = share * back
+        else:
+            state[L_RATE_HIGH] = share * back
+        return
+    if pilot_rate == 0.0:
+        return
+    trial = 1.0
+    roll_out(
+        tables.model, tables.corridor, cell, z, controls, nacelle, (pilot_rate, settings.apply), bias, time, guard, out
+    )
+    margin = min(out[model.OUT_LOW], out[model.OUT_HIGH])
+    low_side = out[model.OUT_LOW] < out[model.OUT_HIGH]
+    if margin >= settings.pass_margin or margin >= stopped:
+        return
+    if stopped <= settings.pass_margin:
+        trial = 0.0
+    else:
+        # The margin falls about linearly with the rate; what the secant allows is tried once more.
+        trial = (stopped - settings.pass_margin) / (stopped - margin)
+        tried = (trial * pilot_rate, settings.apply)
+        roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, tried, bias, time, guard, out)
+        if min(out[model.OUT_LOW], out[model.OUT_HIGH]) < settings.pass_margin:
+            trial *= 0.5
+    if gated and not low_side:
+        trial = 0.0
+    if pilot_rate < 0.0:
+        state[L_RATE_LOW] = trial * pilot_rate
+    else:
+        state[L_RATE_HIGH] = trial * pilot_rate
+    state[L_RATE_REASON] = REASON_LOW if low_side else (REASON_GATE if gated else REASON_HIGH)
+
+
+@njit(cache=True, error_model="numpy")
+def _recover(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    target: FloatArray,
+    z: tuple[float, float, float, float],
+    flight: tuple[float, float, float],
+) -> None:
+    """Recovery stick and lever: the regulator about the trim of an airspeed well inside the corridor."""
+    settings = tables.settings
+    airspeed, angle, climb = flight
+    low, high = speed_range(tables.corridor, angle)
+    aim = airspeed
+    if state[L_RECOVER_SIDE] < 0.0:
+        aim = max(airspeed, low + settings.recovery_margin)
+        state[L_BLEND_REASON] = REASON_LOW
+    elif state[L_RECOVER_SIDE] == 0.0:
+        state[L_BLEND_REASON] = REASON_SINK
+    else:
+        aim = min(airspeed, high - settings.recovery_margin)
+        state[L_BLEND_REASON] = REASON_HIGH
+    step = clip(aim - airspeed, -settings.recovery_step, settings.recovery_step)
+    allowed = max(settings.sink_floor, settings.sink_slope * abs(airspeed))
+    excess = -climb - allowed
+    if step > 0.0 and excess > 0.0:
+        # Height is not traded for speed beyond the allowed descent.
+        step *= max(0.0, 1.0 - excess / allowed)
+        state[L_BLEND_REASON] = REASON_SINK
+    model_at(tables.model, airspeed + step, angle, target)
+    d0 = z[0] - target[model.C_STATE]
+    d1 = z[1] - target[model.C_STATE + 1]
+    d2 = z[2] - target[model.C_STATE + 2]
+    d3 = z[3] - target[model.C_STATE + 3]
+    g = model.C_GAIN
+    stick = target[model.C_CONTROL] - (cell[g] * d0 + cell[g + 1] * d1 + cell[g + 2] * d2 + cell[g + 3] * d3)
+    lever = target[model.C_CONTROL + 1] - (cell[g + 4] * d0 + cell[g + 5] * d1 + cell[g + 6] * d2 + cell[g + 7] * d3)
+    state[L_STICK] = clip(stick, -1.0, 1.0)
+    state[L_LEVER] = clip(lever, 0.0, 1.0)
+
+
+@njit(cache=True, error_model="numpy")
+def blend_recovery(
+    tables: ProtectionTables,
+    state: FloatArray,
+    work: tuple[FloatArray, FloatArray, FloatArray],
+    z: tuple[float, float, float, float],
+    asked: tuple[float, float],
+    nacelle: tuple[float, float, float],
+    pilot_rate: float,
+    flight: tuple[float, float, float],
+    altitude: float,
+) -> None:
+    """Decide how much of stick and lever the recovery takes, and its controls.
+
+    Args:
+        tables: The law.
+        state: Law state; blend and recovery controls are set.
+        work: The model here, scratch of CELL_SIZE and of ROLL_OUT_SIZE numbers.
+        z: u, w, q, pitch.
+        asked: Stick and lever of the pilot.
+        nacelle: Command angle, angle, rate [rad, rad, rad/s].
+        pilot_rate: Nacelle rate asked for [rad/s].
+        flight: Airspeed [m/s], nacelle angle [rad], climb rate [m/s].
+        altitude: Height above the ground [m].
+    """
+    cell, target, out = work
+    settings = tables.settings
+    dt = settings.period
+    bias = (state[L_BIAS], settings.bias_decay)
+    allowed = clip(pilot_rate, state[L_RATE_LOW], state[L_RATE_HIGH])
+    roll_out(
+        tables.model, tables.corridor, cell, z, asked, nacelle, (allowed, 0.5 * settings.horizon), bias,
+        (settings.step, settings.horizon), (settings.pitch, settings.pitch_frequency), out,
+    )  # fmt: skip
+    low, high = out[model.OUT_LOW], out[model.OUT_HIGH]
+    margin = min(low, high)
+    state[L_MARGIN] = margin
+    wanted = clip((settings.blend_begin - margin) / (settings.blend_begin - settings.blend_full), 0.0, 1.0)
+    if wanted > 0.0:
+        state[L_RECOVER_SIDE] = -1.0 if low < high else 1.0
+    airspeed, _, climb = flight
+    sink = allowed_sink(tables.sink, airspeed, altitude)
+    sinking = clip((-climb - sink) / (0.3 * sink), 0.0, 1.0)
+    if sinking > wanted:
+        wanted = sinking
+        if state[L_BLEND] == 0.0 or state[L_RECOVER_SIDE] == 0.0:
+            state[L_RECOVER_SIDE] = 0.0
+    height = (altitude - settings.height_floor) / (settings.height_full - settings.height_floor)
+    wanted = min(wanted, clip(height, 0.0, 1.0))
+    state[L_BLEND] += clip(wanted - state[L_BLEND], -settings.blend_fall * dt, settings.blend_rise * dt)
+    if state[L_BLEND] > 0.0:
+        _recover(tables, state, cell, target, z, flight)
+
+
+@njit(cache=True, error_model="numpy")
+def limit_stick(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    z: tuple[float, float, float, float],
+    controls: tuple[float, float],
+    nacelle_rate: float,
+    measured_flapping: float,
+) -> None:
+    """Bound the stick so that pitch attitude and, with priority, flapping stay inside.
+
+    Args:
+        tables: The law.
+        state: Law state; the stick's bounds are set.
+        cell: The model here.
+        z: u, w, q, pitch.
+        controls: Stick and lever acting now.
+        nacelle_rate: Nacelle rate [rad/s].
+        measured_flapping: Magnitude of the flapping [rad].
+    """
+    settings = tables.settings
+    low, high = -FREE, FREE
+    low_reason, high_reason = REASON_NONE, REASON_NONE
+    power = cell[model.C_B + 6]
+    if power < -0.2:
+        _, _, at_rest, _, _ = accelerations(cell, z, (0.0, controls[1]), (0.0, nacelle_rate))
+        f = settings.pitch_frequency
+        up = f * f * (settings.pitch - z[3]) - 2.0 * f * z[2]
+        down = -f * f * (settings.pitch + z[3]) - 2.0 * f * z[2]
+        low, high = (up - at_rest) / power, (down - at_rest) / power
+        low_reason, high_reason = REASON_PITCH, REASON_PITCH
+
+    slope_c, slope_s = cell[model.C_FLAP_C + 4], cell[model.C_FLAP_S + 4]
+    square = slope_c * slope_c + slope_s * slope_s
+    now_c = affine(cell, model.C_FLAP_C, z, controls, nacelle_rate)
+    now_s = affine(cell, model.C_FLAP_S, z, controls, nacelle_rate)
+    missed = clip(measured_flapping - math.sqrt(now_c * now_c + now_s * now_s), -0.02, 0.05)
+    state[L_FLAP_BIAS] += settings.period / settings.bias_filter * (missed - state[L_FLAP_BIAS])
+    if square > 0.0025:  # 2.9 deg per half travel: less is no means to limit flapping
+        reach = max(settings.flapping - max(state[L_FLAP_BIAS], 0.0), 0.05)
+        b_c, b_s = now_c - slope_c * controls[0], now_s - slope_s * controls[0]
+        middle = -(b_c * slope_c + b_s * slope_s) / square
+        rest = reach * reach - (b_c * b_c + b_s * b_s) + square * middle * middle
+        half = math.sqrt(rest / square) if rest > 0.0 else 0.0
+        if middle - half > low:
+            low, low_reason = middle - half, REASON_FLAP
+        if middle + half < high:
+            high, high_reason = middle + half, REASON_FLAP
+        if low > high:
+            low, high = middle - half, middle + half
+            low_reason, high_reason = REASON_FLAP, REASON_FLAP
+    state[L_STICK_LOW], state[L_STICK_HIGH] = clip(low, -1.0, 1.0), clip(high, -1.0, 1.0)
+    state[L_STICK_LOW_REASON], state[L_STICK_HIGH_REASON] = low_reason, high_reason
+
+
+@njit(cache=True, error_model="numpy")
+def limit_lever(
+    tables: ProtectionTables, state: FloatArray, cell: FloatArray, torque: float, airspeed: float, angle: float
+) -> None:
+    """Bound the lever so that the mast torque stays inside, by feedback of the measured torque.
+
+    Args:
+        tables: The law.
+        state: Law state; the lever's upper bound is set.
+        cell: The model here.
+        torque: Measured mast torque [N m].
+        airspeed: Airspeed [m/s].
+        angle: Nacelle angle [rad].
+    """
+    settings = tables.settings
+    dt = settings.period
+    sensitivity = max(cell[model.C_TORQUE + 5], 1e3)
+    moved = dt / settings.collective_lag * (state[L_ACTED_LEVER] - state[L_COLLECTIVE])
+    own = sensitivity * moved / dt
+    rate = (torque - state[L_LAST_TORQUE]) / dt - own if state[L_STARTED] != 0.0 else 0.0
+    state[L_TORQUE_RATE] += 0.2 * (rate - state[L_TORQUE_RATE])
+    state[L_COLLECTIVE] += moved
+    room = settings.torque_share * torque_limit(tables.torque, airspeed, angle) - torque
+    room -= settings.torque_lead * max(state[L_TORQUE_RATE], 0.0)
+    state[L_LEVER_HIGH] = clip(state[L_COLLECTIVE] + room / sensitivity, 0.0, 1.0)
+    state[L_LEVER_REASON] = REASON_TORQUE

@@ -1,0 +1,233 @@
+"""Compiled margin monitor: distance to every limit, levels with hysteresis, normalized distance to the corridor."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from rtsim.corridor.corridor_kernels import CorridorTables
+from rtsim.frame import FloatArray
+from rtsim.protection.law_data import (
+    L_SIDE,
+    L_TIME,
+    LAW_MONITOR,
+    LAW_STATE_SIZE,
+    SENSE_AIRSPEED,
+    SENSE_ALTITUDE,
+    SENSE_CLIMB_RATE,
+    SENSE_DOWNSTOP,
+    SENSE_FLAPPING,
+    SENSE_LOAD_FACTOR,
+    SENSE_NACELLE,
+    SENSE_NACELLE_RATE,
+    SENSE_PITCH,
+    SENSE_TORQUE,
+    WORK_SIZE,
+    ProtectionTables,
+    SinkTables,
+    TorqueTables,
+)
+from rtsim.protection.law_kernels import law_start, protect
+from rtsim.protection.limiter_kernels import allowed_sink, torque_limit
+from rtsim.protection.prediction_kernels import BoundaryTables, speed_range
+from rtsim.units import DEGREE, KNOT
+
+KIND_STALL, KIND_LOAD, KIND_GATE, KIND_RANGE, KIND_RATE, KIND_FLAP = 0, 1, 2, 3, 4, 5
+KIND_TORQUE, KIND_NZ, KIND_PITCH, KIND_CONSISTENCY, KIND_SINK, KIND_TIME = 6, 7, 8, 9, 10, 11
+"""Places of the margins, the order of ``limits.LIMIT_KINDS``, and last the time to the corridor's boundary."""
+KIND_COUNT = 12
+LEVEL_STATE_SIZE = KIND_COUNT * 6
+FAR = 1e3
+"""A margin where the limit does not apply."""
+
+
+class MonitorTables(NamedTuple):
+    """Limits and levels; SI and radians, read-only."""
+
+    chart: BoundaryTables
+    """The corridor that is watched."""
+    corners: CorridorTables
+    """The same with its corners, for the normalized distance."""
+    plant: BoundaryTables
+    """The corridor that the plant's level trims allow."""
+    torque: TorqueTables
+    """Mast torque."""
+    sink: SinkTables
+    """Sink rate."""
+    flapping: float
+    """Flapping at the stop [rad]."""
+    load_factor_max: float
+    """Largest load factor."""
+    load_factor_min: float
+    """Smallest load factor."""
+    pitch: float
+    """Largest pitch attitude [rad]."""
+    nacelle_forward: float
+    """Smallest nacelle angle [rad]."""
+    nacelle_aft: float
+    """Largest nacelle angle [rad]."""
+    nacelle_rate: float
+    """Fastest nacelle motion [rad/s]."""
+    threshold: FloatArray
+    """Margins below which caution, warning, exceedance begin (KIND_COUNT, 3)."""
+    hysteresis: FloatArray
+    """How far above its threshold a margin must rise before a level ends (KIND_COUNT,)."""
+    rise: float
+    """How long a margin must be below a threshold [s]."""
+    fall: float
+    """How long it must be above threshold plus hysteresis [s]."""
+
+
+@njit(cache=True, error_model="numpy")
+def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: float, out: FloatArray) -> None:
+    """Signed distance to every limit, positive inside.
+
+    Args:
+        tables: The limits.
+        sensors: What is known, order of ``rtsim.command.Sensors``.
+        time_to_limit: Predicted time to the corridor's boundary [s].
+        out: Written, shape (KIND_COUNT,): m/s for speeds, rad and rad/s for angles, share of the limit for torque.
+    """
+    airspeed, angle = sensors[SENSE_AIRSPEED], sensors[SENSE_NACELLE]
+    low, high = speed_range(tables.chart, angle)
+    out[KIND_STALL] = airspeed - low
+    out[KIND_LOAD] = high - airspeed
+    # On the downstop the gate is closed, margin negative, while leaving it would be over the limit off it.
+    out[KIND_GATE] = tables.chart.high[0] - airspeed if sensors[SENSE_DOWNSTOP] != 0.0 else FAR
+    out[KIND_RANGE] = min(angle - tables.nacelle_forward, tables.nacelle_aft - angle)
+    out[KIND_RATE] = tables.nacelle_rate - abs(sensors[SENSE_NACELLE_RATE])
+    out[KIND_FLAP] = tables.flapping - abs(sensors[SENSE_FLAPPING])
+    out[KIND_TORQUE] = 1.0 - sensors[SENSE_TORQUE] / torque_limit(tables.torque, airspeed, angle)
+    nz = sensors[SENSE_LOAD_FACTOR]
+    out[KIND_NZ] = min(tables.load_factor_max - nz, nz - tables.load_factor_min)
+    out[KIND_PITCH] = tables.pitch - abs(sensors[SENSE_PITCH])
+    low, high = speed_range(tables.plant, angle)
+    out[KIND_CONSISTENCY] = min(airspeed - low, high - airspeed)
+    out[KIND_SINK] = allowed_sink(tables.sink, airspeed, sensors[SENSE_ALTITUDE]) + sensors[SENSE_CLIMB_RATE]
+    out[KIND_TIME] = time_to_limit
+
+
+@njit(cache=True, error_model="numpy")
+def levels_step(tables: MonitorTables, margins: FloatArray, dt: float, state: FloatArray, levels: FloatArray) -> None:
+    """Advance the warning level of every limit by one frame.
+
+    Each threshold has its own timer, as in ``rtsim.corridor``.
+
+    Args:
+        tables: The levels.
+        margins: From ``limit_margins``.
+        dt: Length of the frame [s].
+        state: Updated in place, zeros at the start, shape (LEVEL_STATE_SIZE,).
+        levels: Written: 0 clear, 1 caution, 2 warning, 3 exceedance, shape (KIND_COUNT,).
+    """
+    tolerance = 0.5 * dt
+    for kind in range(KIND_COUNT):
+        level = 0.0
+        for k in range(3):
+            active = 6 * kind + 2 * k
+            timer = active + 1
+            if state[active] == 0.0:
+                waiting, hold = margins[kind] < tables.threshold[kind, k], tables.rise
+            else:
+                waiting = margins[kind] > tables.threshold[kind, k] + tables.hysteresis[kind]
+                hold = tables.fall
+            state[timer] = state[timer] + dt if waiting else 0.0
+            if state[timer] > hold - tolerance:
+                state[active] = 1.0 - state[active]
+                state[timer] = 0.0
+            if state[active] != 0.0:
+                level = k + 1.0
+        levels[kind] = level
+
+
+@njit(cache=True, error_model="numpy")
+def _segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    dx, dy = x1 - x0, y1 - y0
+    square = dx * dx + dy * dy
+    t = min(max(((x - x0) * dx + (y - y0) * dy) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    return math.hypot(x - x0 - t * dx, y - y0 - t * dy)
+
+
+@njit(cache=True, error_model="numpy")
+def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) -> float:
+    """Signed distance to the nearer boundary in the plane of airspeed / 10 kn and nacelle angle / 10 deg.
+
+    For displays and ranking; laws use the speed margins.
+
+    Args:
+        tables: The corridor.
+        airspeed: Airspeed [m/s].
+        angle: Nacelle angle [rad].
+
+    Returns:
+        The distance [-], positive inside.
+    """
+    x, y = airspeed / (10.0 * KNOT), angle / (10.0 * DEGREE)
+    best = FAR
+    for side in range(2):
+        nacelle = tables.corners.low_nacelle if side == 0 else tables.corners.high_nacelle
+        speed = tables.corners.low_speed if side == 0 else tables.corners.high_speed
+        for i in range(nacelle.shape[0] - 1):
+            x0, y0 = speed[i] / (10.0 * KNOT), nacelle[i] / (10.0 * DEGREE)
+            x1, y1 = speed[i + 1] / (10.0 * KNOT), nacelle[i + 1] / (10.0 * DEGREE)
+            best = min(best, _segment_distance(x, y, x0, y0, x1, y1))
+    low, high = speed_range(tables.chart, angle)
+    if angle <= tables.chart.downstop_nacelle and airspeed > tables.corners.high_speed[0]:
+        # On the downstop the flap-extended limit is no boundary; the end of the downstop's own range is.
+        best = abs(high - airspeed) / (10.0 * KNOT)
+    return best if low <= airspeed <= high else -best
+
+
+@njit(cache=True, error_model="numpy")
+def watch(
+    tables: MonitorTables,
+    sensors: FloatArray,
+    time_to_limit: FloatArray,
+    dt: float,
+    margins: FloatArray,
+    levels: FloatArray,
+    distance: FloatArray,
+) -> None:
+    """Monitor a whole flight.
+
+    Args:
+        tables: Limits and levels.
+        sensors: One row per frame (frames, SENSOR_COUNT).
+        time_to_limit: One per frame (frames,) [s].
+        dt: Length of a frame [s].
+        margins: Written (frames, KIND_COUNT).
+        levels: Written (frames, KIND_COUNT).
+        distance: Written: normalized distance (frames,).
+    """
+    state = np.zeros(LEVEL_STATE_SIZE)
+    for k in range(sensors.shape[0]):
+        limit_margins(tables, sensors[k], time_to_limit[k], margins[k])
+        levels_step(tables, margins[k], dt, state, levels[k])
+        distance[k] = normalized_distance(tables, sensors[k, SENSE_AIRSPEED], sensors[k, SENSE_NACELLE])
+
+
+@njit(cache=True, error_model="numpy")
+def predict(
+    tables: ProtectionTables, sensors: FloatArray, acting: FloatArray, time_to_limit: FloatArray, side: FloatArray
+) -> None:
+    """Time to the corridor's boundary over a whole flight, as the laws see it in flight.
+
+    Args:
+        tables: A law's tables; whatever the law, nothing is limited here.
+        sensors: One row per frame (frames, SENSOR_COUNT).
+        acting: Stick, lever, nacelle rate [rad/s] that acted (frames, 3).
+        time_to_limit: Written (frames,) [s].
+        side: Written: -1 low, 1 high, 0 none within the horizon (frames,).
+    """
+    watching = ProtectionTables(
+        LAW_MONITOR, tables.every, tables.model, tables.corridor, tables.torque, tables.sink, tables.settings
+    )
+    state = np.empty(LAW_STATE_SIZE)
+    law_start(watching, state)
+    work, applied = np.empty(WORK_SIZE), np.empty(3)
+    for k in range(sensors.shape[0]):
+        protect(watching, state, k, sensors[k], acting[k], applied, work)
+        time_to_limit[k], side[k] = state[L_TIME], state[L_SIDE]
