@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from math import exp
 
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 
 
-@kernel
+@inner_kernel
 def critically_damped_ramp(
     frequency: float, command: float, command_rate: float, value: float, value_rate: float, elapsed: float
 ) -> tuple[float, float, float]:

@@ -189,7 +189,7 @@ class Simulation:
     def pilot_command(self) -> Command:
         """The built-in MOCM's command for the frame that starts now; changes nothing."""
         self._observe()
-        kernels.pilot_command(self.tables, self._state, self._scratch, self._noise, self._command)
+        kernels.pilot_command(self.tables, self._state, self._scratch, self._command)
         stick, lever, rate = (float(value) for value in self._command)
         return Command(stick, lever, rate)
 
@@ -216,7 +216,7 @@ class Simulation:
         if command is not None:
             self._command[:] = command.stick, command.lever, command.nacelle_rate
         elif self.mode == "mocm":
-            kernels.pilot_command(self.tables, self._state, self._scratch, self._noise, self._command)
+            kernels.pilot_command(self.tables, self._state, self._scratch, self._command)
         else:
             self._command[:] = self._state.u[INPUT.stick], self._state.u[INPUT.lever], 0.0
         if applied is None:

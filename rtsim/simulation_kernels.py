@@ -18,7 +18,7 @@ from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.aircraft.tables import AircraftTables
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, G_Q, G_U, G_W, GustTables, gust_step
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel, kernel
 from rtsim.corridor.corridor_kernels import CorridorTables, corridor_level_step, corridor_margins
 from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import (
@@ -41,7 +41,7 @@ from rtsim.nacelle.nacelle_kernels import (
     nacelle_path,
     on_downstop,
 )
-from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance, mocm_engage, mocm_output
+from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance_in, mocm_engage, mocm_output_in
 from rtsim.ramp_filter_kernels import critically_damped_ramp
 from rtsim.units import (
     DEGREE,
@@ -160,6 +160,8 @@ class Scratch(NamedTuple):
     """Stick, lever, nacelle rate."""
     hands: FloatArray
     """Stick and lever after protection, before the aids."""
+    pilot: FloatArray
+    """Work array of the pilot kernels."""
     asked: FloatArray
     """The pilot's command in a compiled run: stick, lever, nacelle rate."""
     planned: FloatArray
@@ -168,7 +170,7 @@ class Scratch(NamedTuple):
     """Gust of the next frame in body axes."""
 
 
-@kernel
+@inner_kernel
 def programme_at(programme: FloatArray, row: int, time: float) -> float:
     """Value of one row of the programme, linear between its points and held after the last.
 
@@ -194,7 +196,7 @@ def programme_at(programme: FloatArray, row: int, time: float) -> float:
     return programme[row, low] + share * (programme[row, high] - programme[row, low])
 
 
-@kernel
+@inner_kernel
 def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
     """Fill the row with all that is known before the command of this frame; changes no state.
 
@@ -287,7 +289,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.failures] = float(fault_mask(state.faults))
 
 
-@kernel
+@inner_kernel
 def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, airspeed: float) -> None:
     """Fill what pilots and laws are shown: indicated airspeed, its margins, and the state shifted to agree with it.
 
@@ -309,35 +311,23 @@ def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, air
         seen[STATE.w] += shift * math.sin(x[STATE.pitch])
 
 
-@kernel
-def pilot_command(
-    tables: SimulationTables, state: SimulationState, scratch: Scratch, noise: FloatArray, out: FloatArray
-) -> None:
+@inner_kernel
+def pilot_command(tables: SimulationTables, state: SimulationState, scratch: Scratch, out: FloatArray) -> None:
     """The built-in MOCM's command for the frame just observed; changes no state.
 
     Args:
         tables: The simulation.
         state: Its state at the start of the frame.
         scratch: Work space as ``observe`` left it.
-        noise: Standard normals of this frame; empty where the noise is off.
         out: Written: stick, lever, nacelle rate [rad/s].
     """
-    mocm_output(
-        tables.pilot,
-        state.pilot,
-        scratch.seen,
-        scratch.motion[0],
-        scratch.motion[1],
-        scratch.target,
-        noise,
-        scratch.command,
-    )
+    mocm_output_in(tables.pilot, state.pilot, scratch.motion[0], scratch.target, scratch.command, scratch.pilot)
     out[0] = scratch.command[0]
     out[1] = scratch.command[1]
     out[2] = scratch.target[4]
 
 
-@kernel
+@inner_kernel
 def _end_code(tables: SimulationTables, state: SimulationState) -> int:
     """Whether the flight is over, and how; a landing is judged by sink rate, attitude, speed and rotor clearance."""
     x = state.x
@@ -361,7 +351,7 @@ def _end_code(tables: SimulationTables, state: SimulationState) -> int:
     return END_ATTITUDE if abs(pitch) > LARGEST_PITCH else END_NONE
 
 
-@kernel
+@inner_kernel
 def advance(
     tables: SimulationTables,
     state: SimulationState,
@@ -412,8 +402,9 @@ def advance(
     row[COLUMN.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
 
     if state.clock[CLOCK_MODE] == MODE_MOCM:
-        mocm_advance(
-            tables.pilot, state.pilot, scratch.seen, angle, scratch.motion[1], scratch.target, acting, noise, dt
+        scalars = (angle, scratch.motion[1], dt)
+        mocm_advance_in(
+            tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, noise, scratch.pilot
         )
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = stick
@@ -446,7 +437,7 @@ def advance(
     state.clock[CLOCK_END] = _end_code(tables, state)
 
 
-@kernel
+@inner_kernel
 def disturb(
     tables: SimulationTables, state: SimulationState, scratch: Scratch, elapsed: float, air_noise: FloatArray
 ) -> None:
@@ -469,7 +460,7 @@ def disturb(
     fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
 
 
-@kernel
+@inner_kernel
 def run_frames(
     tables: SimulationTables,
     state: SimulationState,
@@ -497,7 +488,7 @@ def run_frames(
             return k
         observe(tables, state, scratch, rows[k])
         if state.clock[CLOCK_MODE] == MODE_MOCM:
-            pilot_command(tables, state, scratch, noise[k], command)
+            pilot_command(tables, state, scratch, command)
         else:
             command[0] = state.u[INPUT.stick]
             command[1] = state.u[INPUT.lever]

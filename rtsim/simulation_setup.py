@@ -23,6 +23,7 @@ from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
+from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme
 from rtsim.units import to_deg, to_kt
@@ -152,6 +153,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         target=np.zeros(kernels.TARGET_SIZE),
         command=np.zeros(3),
         hands=np.zeros(2),
+        pilot=np.zeros(pilot_work_size(tables.pilot)),
         asked=np.zeros(3),
         planned=np.zeros(3),
         gust=np.zeros(3),

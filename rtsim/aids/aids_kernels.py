@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from rtsim.aircraft.signals import STATE
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 
 # Places in the switches; 1 on, 0 off.
@@ -64,7 +64,7 @@ class AidTables(NamedTuple):
     """Nacelle angles between which altitude passes from stick (airplane) to lever (helicopter) [rad]."""
 
 
-@kernel
+@inner_kernel
 def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
     low = 0
     high = axis.shape[0] - 1
@@ -78,7 +78,7 @@ def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
     return low, min(max(share, 0.0), 1.0)
 
 
-@kernel
+@inner_kernel
 def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) -> float:
     """Value of one map at a flight condition, bilinear and held outside the grid.
 
@@ -96,7 +96,7 @@ def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) ->
     )
 
 
-@kernel
+@inner_kernel
 def _beyond(value: float, dead_zone: float) -> float:
     """The part of a deflection beyond the dead zone, rescaled to full travel."""
     if abs(value) <= dead_zone:
@@ -104,12 +104,12 @@ def _beyond(value: float, dead_zone: float) -> float:
     return math.copysign((abs(value) - dead_zone) / (1.0 - dead_zone), value)
 
 
-@kernel
+@inner_kernel
 def _limited(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
-@kernel
+@inner_kernel
 def _terms(
     tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray
 ) -> tuple[float, float, float, float]:
@@ -165,7 +165,7 @@ def _terms(
     return stick + _limited(added, tables.authority), lever, height_error, speed_error
 
 
-@kernel
+@inner_kernel
 def aids_engage(
     tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray, acting: FloatArray
 ) -> None:
@@ -195,7 +195,7 @@ def aids_engage(
         state[LAST_SWITCHES + i] = switches[i]
 
 
-@kernel
+@inner_kernel
 def aids_step(
     tables: AidTables,
     state: FloatArray,

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-import numba
-
 from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.tables import BodyTables, Configuration, WingTables
+from rtsim.compiled import inner_kernel
 
 Load = tuple[float, float, float]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def fold(alpha: float) -> float:
     """Angle of attack folded into -90 .. 90 deg; flow from behind is treated as its mirror image (low confidence).
 
@@ -26,7 +25,7 @@ def fold(alpha: float) -> float:
     return alpha
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def moment_arm(position: tuple[float, float], gravity_centre: tuple[float, float]) -> tuple[float, float]:
     """Arm from the centre of gravity in body axes (x forward, z down) [m].
 
@@ -37,7 +36,7 @@ def moment_arm(position: tuple[float, float], gravity_centre: tuple[float, float
     return gravity_centre[0] - position[0], gravity_centre[1] - position[1]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def wind_to_body(lift: float, drag: float, u: float, w: float, arm: tuple[float, float], moment: float) -> Load:
     """Resolve lift and drag of a surface in the flow (u, w) into body axes.
 
@@ -55,7 +54,7 @@ def wind_to_body(lift: float, drag: float, u: float, w: float, arm: tuple[float,
     return x, z, moment + arm[1] * x - arm[0] * z
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def wing_coefficients(
     wing: WingTables, alpha: float, mast_fraction: float, flap: float, mach: float
 ) -> tuple[float, float]:
@@ -91,7 +90,7 @@ def wing_coefficients(
     return lift, drag
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def wing_angle_of_attack(
     wing: WingTables, alpha: float, nacelle: float, advance_ratio: float, rotor_force_coefficient: float
 ) -> float:
@@ -109,7 +108,7 @@ def wing_angle_of_attack(
     return alpha - upwash * rotor_force_coefficient / max(0.15, advance_ratio) ** 2
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def immersed_share(wing: WingTables, airspeed: float) -> float:
     """How much of the hover download is left at this airspeed, 1 to 0.
 
@@ -121,7 +120,7 @@ def immersed_share(wing: WingTables, airspeed: float) -> float:
     return (1.0 - ratio * ratio) ** 2
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def wing_load(
     wing: WingTables,
     air: Configuration,
@@ -170,7 +169,7 @@ def wing_load(
     return x + x_wake, z + z_wake, moment + arms[1][1] * x_wake - arms[1][0] * z_wake
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def body_load(
     body: BodyTables,
     air: Configuration,

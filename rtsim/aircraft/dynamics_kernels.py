@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import math
 
-import numba
-
 from rtsim.aircraft.airframe_kernels import body_load, moment_arm, wing_angle_of_attack, wing_load
 from rtsim.aircraft.rotor_kernels import (
+    FLOW_COUNT,
     FORWARD_FORCE,
     LOAD_COUNT,
     THRUST,
     TORQUE,
     flapping_accelerations,
     inflow_rates,
-    rotor_loads,
+    rotor_loads_in,
 )
 from rtsim.aircraft.signals import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
 from rtsim.aircraft.table_kernels import FloatArray, curve
 from rtsim.aircraft.tables import AircraftTables, ControlTables, MassTables
 from rtsim.aircraft.tail_kernels import tail_load
+from rtsim.compiled import inner_kernel
 from rtsim.units import GRAVITY
 
 # The work array: rotor loads, then what `outputs` needs.
@@ -27,10 +27,13 @@ WORK_WING_ALPHA = LOAD_COUNT
 WORK_FORCE_Z = LOAD_COUNT + 1
 COMPONENT = LOAD_COUNT + 2
 """Loads X, Z, M of rotors, wing, body, tail follow from here in the work array."""
-WORK_COUNT = COMPONENT + 12
+FLOW = COMPONENT + 12
+"""The blade sections' flow and forces follow from here in the work array."""
+MOST_STATIONS = 64
+WORK_COUNT = FLOW + FLOW_COUNT * MOST_STATIONS
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> float:
     """Flap deflection: the default off the downstop; on it, retracted linearly between two airspeeds [rad].
 
@@ -45,7 +48,7 @@ def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> f
     return controls.default_flap * (1.0 - retracted * on_stop)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def gravity_centre(mass: MassTables, nacelle: float) -> tuple[float, float]:
     """Stationline and waterline of the centre of gravity [m] (NASA CR-166536 shift law).
 
@@ -61,7 +64,7 @@ def gravity_centre(mass: MassTables, nacelle: float) -> tuple[float, float]:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def commanded_controls(
     controls: ControlTables, stick: float, lever: float, nacelle: float
 ) -> tuple[float, float, float]:
@@ -82,7 +85,7 @@ def commanded_controls(
     return low + lever * (high - low), cyclic, elevator
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def derivative(
     tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle: float, xdot: FloatArray, work: FloatArray
 ) -> None:
@@ -123,7 +126,8 @@ def derivative(
         x[STATE.flap_1s_rate],
     )
     inflow = (x[STATE.inflow_0], x[STATE.inflow_1c], x[STATE.inflow_1s])
-    rotor_loads(rotor, air, hub, flapping, inflow, (x[STATE.collective_75], x[STATE.cyclic_1s]), work)
+    flow = work[FLOW : FLOW + FLOW_COUNT * rotor.stations.shape[0]].reshape((FLOW_COUNT, rotor.stations.shape[0]))
+    rotor_loads_in(rotor, air, hub, flapping, inflow, (x[STATE.collective_75], x[STATE.cyclic_1s]), work, flow)
     thrust, forward = 2.0 * work[THRUST], 2.0 * work[FORWARD_FORCE]
     rotor_x = thrust * cn + forward * sn
     rotor_z = -thrust * sn + forward * cn
@@ -204,7 +208,7 @@ def derivative(
     work[COMPONENT + 9], work[COMPONENT + 10], work[COMPONENT + 11] = tail_x, tail_z, tail_m
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def outputs(
     tables: AircraftTables,
     x: FloatArray,
@@ -243,7 +247,7 @@ def outputs(
     y[OUTPUT.flapping] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def step(
     tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle_path: FloatArray, dt: float, work: FloatArray
 ) -> None:

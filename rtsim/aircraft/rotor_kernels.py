@@ -17,11 +17,11 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from rtsim.aircraft.table_kernels import FloatArray, curve
 from rtsim.aircraft.tables import Configuration, RotorTables
+from rtsim.compiled import inner_kernel, kernel
 
 # Entries of the load vector written by rotor_loads.
 THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT = 0, 1, 2, 3, 4, 5
@@ -31,7 +31,7 @@ ALPHA, SPEED, UT, UP, LIFT, DRAG = 0, 1, 2, 3, 4, 5
 FLOW_COUNT = 6
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def _angle(y: float, x: float) -> float:
     """The angle atan2(y, x) [rad], written out so that the loop over the stations becomes vector instructions.
 
@@ -54,7 +54,7 @@ def _angle(y: float, x: float) -> float:
     return -angle if y < 0.0 else angle
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def _section_flow(
     rotor: RotorTables,
     tangential: tuple[float, float],
@@ -85,7 +85,7 @@ def _section_flow(
         flow[UP, i] = up
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
     """Look up lift and drag coefficient of every station before compressibility.
 
@@ -111,7 +111,7 @@ def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
         flow[DRAG, i] = h00 * data[i, k, 2] + h10 * data[i, k, 3] + h01 * data[i, k + 1, 2] + h11 * data[i, k + 1, 3]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) -> None:
     """Turn the coefficients into forces normal to and in the disc plane (overwriting LIFT and DRAG) [N].
 
@@ -143,7 +143,7 @@ def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) ->
         flow[DRAG, i] = lift * flow[UP, i] + drag * flow[UT, i]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def rotor_loads(
     rotor: RotorTables,
     air: Configuration,
@@ -164,6 +164,33 @@ def rotor_loads(
         pitch: Collective at 75 % radius, longitudinal cyclic [rad].
         loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
     """
+    flow = np.empty((FLOW_COUNT, rotor.stations.shape[0]))
+    rotor_loads_in(rotor, air, hub, flapping, inflow, pitch, loads, flow)
+
+
+@inner_kernel
+def rotor_loads_in(
+    rotor: RotorTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    flapping: tuple[float, float, float, float, float, float],
+    inflow: tuple[float, float, float],
+    pitch: tuple[float, float],
+    loads: FloatArray,
+    flow: FloatArray,
+) -> None:
+    """`rotor_loads` in given work space.
+
+    Args:
+        rotor: The rotor.
+        air: Density, speed of sound, rotor speed.
+        hub: vf, vt, p.
+        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
+        inflow: l0, l1c, l1s.
+        pitch: Collective at 75 % radius, longitudinal cyclic [rad].
+        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
+        flow: Scratch, shape (FLOW_COUNT, stations).
+    """
     vf, vt, p = hub
     b0, b0d, b1c, b1cd, b1s, b1sd = flapping
     l0, l1c, l1s = inflow
@@ -171,7 +198,6 @@ def rotor_loads(
     tip = om * rotor.radius
     azimuths = rotor.cos_azimuth.shape[0]
     stations = rotor.stations
-    flow = np.empty((FLOW_COUNT, stations.shape[0]))
     for i in range(LOAD_COUNT):
         loads[i] = 0.0
     for j in range(azimuths):
@@ -207,7 +233,7 @@ def rotor_loads(
     loads[SINE_MOMENT] *= 2.0 / azimuths
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def flapping_accelerations(
     rotor: RotorTables,
     om: float,
@@ -238,7 +264,7 @@ def flapping_accelerations(
     return b0dd, b1cdd, b1sdd
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def inflow_rates(
     rotor: RotorTables,
     air: Configuration,

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
+
+from rtsim.compiled import inner_kernel
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class Surfaces(NamedTuple):
     """Value, x derivative, y derivative and cross derivative, shape (surfaces, x points, y points, 4)."""
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def curve(table: Curves, which: int, argument: float) -> float:
     """Value of curve number ``which`` at ``argument``.
 
@@ -74,7 +75,7 @@ def curve(table: Curves, which: int, argument: float) -> float:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def _cell(argument: float, start: float, step: float, points: int) -> tuple[int, float]:
     position = (argument - start) / step
     if position <= 0.0:
@@ -85,7 +86,7 @@ def _cell(argument: float, start: float, step: float, points: int) -> tuple[int,
     return i, position - i
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def surface(table: Surfaces, which: int, x: float, y: float) -> float:
     """Value of surface number ``which`` at (x, y), bicubic Hermite.
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numba
-
 from rtsim.aircraft.airframe_kernels import fold, wind_to_body
 from rtsim.aircraft.table_kernels import FloatArray, curve, surface
 from rtsim.aircraft.tables import Configuration, TailTables
+from rtsim.compiled import inner_kernel
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def _bracket(nodes: FloatArray, nacelle: float) -> tuple[int, float]:
     """Interval and weight of the upper end in descending nacelle angles."""
     last = nodes.shape[0] - 1
@@ -21,7 +20,7 @@ def _bracket(nodes: FloatArray, nacelle: float) -> tuple[int, float]:
     return k, min(max((nodes[k] - nacelle) / (nodes[k] - nodes[k + 1]), 0.0), 1.0)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) -> float:
     """Wing downwash at the tail before compressibility [rad]; linear in nacelle angle and flap between the tables.
 
@@ -44,7 +43,7 @@ def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) 
     return total
 
 
-@numba.njit(cache=True, error_model="numpy")
+@inner_kernel
 def tail_load(
     tail: TailTables,
     air: Configuration,

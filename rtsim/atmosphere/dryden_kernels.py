@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 from rtsim.units import FOOT
 
@@ -68,7 +68,7 @@ class TurbulenceTables(NamedTuple):
     """Intensity of the medium/high-altitude model, shape (c, a) [m/s]; the curve for no wind is zero."""
 
 
-@kernel
+@inner_kernel
 def high_altitude_intensity(tables: TurbulenceTables, altitude: float, wind: float) -> float:
     """Intensity of the medium/high-altitude model: linear in height and between the curves, held beyond in height.
 
@@ -99,7 +99,7 @@ def high_altitude_intensity(tables: TurbulenceTables, altitude: float, wind: flo
     return below + (wind - tables.wind[j]) / (tables.wind[j + 1] - tables.wind[j]) * (above - below)
 
 
-@kernel
+@inner_kernel
 def turbulence_scales(tables: TurbulenceTables, altitude: float, wind: float) -> tuple[float, float, float, float]:
     """Intensities and scale lengths at a height (MIL-F-8785C 3.7.2 and 3.7.3.4).
 
@@ -127,7 +127,7 @@ def turbulence_scales(tables: TurbulenceTables, altitude: float, wind: float) ->
     return sigma_u, sigma_w, scale_u, scale_w
 
 
-@kernel
+@inner_kernel
 def sinh_excess(s: float) -> float:
     """``sinh(s)**2 - s**2`` without cancellation; the variance that only the second normal explains.
 
@@ -141,7 +141,7 @@ def sinh_excess(s: float) -> float:
     return excess * (2.0 * s + excess)
 
 
-@kernel
+@inner_kernel
 def advance_first_order(z: float, s: float, n: float) -> float:
     """Move the longitudinal filter by a distance; exact in distribution for any distance.
 
@@ -156,7 +156,7 @@ def advance_first_order(z: float, s: float, n: float) -> float:
     return z * math.exp(-s) + math.sqrt(-math.expm1(-2.0 * s)) * n
 
 
-@kernel
+@inner_kernel
 def advance_second_order(z1: float, z2: float, s: float, n1: float, n2: float) -> tuple[float, float]:
     """Move the vertical filter by a distance; exact in distribution for any distance.
 
@@ -184,7 +184,7 @@ def advance_second_order(z1: float, z2: float, s: float, n1: float, n2: float) -
     return decay * z1 + first * n1, decay * (2.0 * s * z1 + z2) + cross * n1 + second * n2
 
 
-@kernel
+@inner_kernel
 def advance_lag(lag: float, before: float, now: float, a: float) -> float:
     """Move a first-order lag by one frame over which its input is a straight line.
 
@@ -201,7 +201,7 @@ def advance_lag(lag: float, before: float, now: float, a: float) -> float:
     return lag + gone * (before - lag) + (1.0 - gone / a) * (now - before)
 
 
-@kernel
+@inner_kernel
 def turbulence_step(
     tables: TurbulenceTables, state: FloatArray, speed: float, altitude: float, dt: float, normals: FloatArray
 ) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 
 # The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
@@ -59,7 +59,7 @@ class GustTables(NamedTuple):
     """Parameters of the turbulence."""
 
 
-@kernel
+@inner_kernel
 def gust_shape(shape: float, entered: float, extent: float) -> float:
     """How much of its amplitude a gust has at a place.
 
@@ -84,7 +84,7 @@ def gust_shape(shape: float, entered: float, extent: float) -> float:
     return entered / extent
 
 
-@kernel
+@inner_kernel
 def gust_step(
     tables: GustTables,
     state: FloatArray,

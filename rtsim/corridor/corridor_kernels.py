@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 
 LOW, HIGH, NACELLE_FORWARD, NACELLE_AFT = 0, 1, 2, 3
@@ -46,7 +46,7 @@ class CorridorTables(NamedTuple):
     """How long the margin must be above threshold + hysteresis before the level ends [s]."""
 
 
-@kernel
+@inner_kernel
 def boundary_speed(nacelle: FloatArray, speed: FloatArray, angle: float) -> float:
     """Speed of a boundary at a nacelle angle; constant beyond its ends.
 
@@ -68,7 +68,7 @@ def boundary_speed(nacelle: FloatArray, speed: FloatArray, angle: float) -> floa
     return speed[last]
 
 
-@kernel
+@inner_kernel
 def most_forward_angle(tables: CorridorTables, airspeed: float) -> float:
     """Smallest nacelle angle at which the airspeed is not below the low-speed boundary.
 
@@ -89,7 +89,7 @@ def most_forward_angle(tables: CorridorTables, airspeed: float) -> float:
     return nacelle[nacelle.shape[0] - 1]
 
 
-@kernel
+@inner_kernel
 def most_aft_angle(tables: CorridorTables, airspeed: float) -> float:
     """Largest nacelle angle at which the airspeed is not above the high-speed boundary.
 
@@ -114,7 +114,7 @@ def most_aft_angle(tables: CorridorTables, airspeed: float) -> float:
     return nacelle[0]
 
 
-@kernel
+@inner_kernel
 def corridor_margins(tables: CorridorTables, airspeed: float, nacelle_angle: float, out: FloatArray) -> None:
     """Signed distances to the boundaries, positive inside.
 
@@ -142,7 +142,7 @@ def corridor_margins(tables: CorridorTables, airspeed: float, nacelle_angle: flo
         out[3] = -travel
 
 
-@kernel
+@inner_kernel
 def corridor_level_step(tables: CorridorTables, margin: float, dt: float, state: FloatArray) -> int:
     """Advance the warning level by one frame.
 

@@ -15,7 +15,7 @@ from rtsim.aircraft.dynamics_kernels import commanded_controls
 from rtsim.aircraft.signals import STATE
 from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.tables import ControlTables
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 
 # Kinds, as numbers in the schedule.
@@ -99,7 +99,7 @@ class FaultTables(NamedTuple):
     """Its growth with the airspeed along the mast [W s/(rad m)]."""
 
 
-@kernel
+@inner_kernel
 def fault_apply(
     state: FloatArray, change: FloatArray, x: FloatArray, nacelle: FloatArray, frequency: float, airspeed: float
 ) -> None:
@@ -144,7 +144,7 @@ def fault_apply(
         state[F_POWER] = value
 
 
-@kernel
+@inner_kernel
 def fault_update(
     tables: FaultTables,
     state: FloatArray,
@@ -172,7 +172,7 @@ def fault_update(
     state[F_NEXT] = number
 
 
-@kernel
+@inner_kernel
 def fault_mask(state: FloatArray) -> int:
     """Give the active failures as a sum of ``MASK_*``.
 
@@ -194,7 +194,7 @@ def fault_mask(state: FloatArray) -> int:
     return mask
 
 
-@kernel
+@inner_kernel
 def fault_nacelle_ok(state: FloatArray) -> bool:
     """Tell whether the conversion actuator follows its commands, however slowly.
 
@@ -204,7 +204,7 @@ def fault_nacelle_ok(state: FloatArray) -> bool:
     return state[F_JAMMED] == 0.0
 
 
-@kernel
+@inner_kernel
 def fault_airspeed_error(state: FloatArray, airspeed: float) -> float:
     """Give what the airspeed indication is wrong by [m/s]; exactly 0.0 where it is sound.
 
@@ -217,7 +217,7 @@ def fault_airspeed_error(state: FloatArray, airspeed: float) -> float:
     return state[F_BIAS]
 
 
-@kernel
+@inner_kernel
 def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
     """Limit the nacelle rate to what the failed conversion actuator can do.
 
@@ -236,7 +236,7 @@ def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
     return rate
 
 
-@kernel
+@inner_kernel
 def collective_rate_limit(
     tables: FaultTables, state: FloatArray, x: FloatArray, nacelle_angle: float, power: float
 ) -> float:
@@ -254,7 +254,7 @@ def collective_rate_limit(
     return tables.governor_frequency * (state[F_POWER] - power) / slope
 
 
-@kernel
+@inner_kernel
 def fault_actuators_begin(
     tables: FaultTables,
     state: FloatArray,
@@ -323,7 +323,7 @@ def fault_actuators_begin(
             x[STATE.collective_75 + channel] = (mean - 0.5 * gone * command) / (1.0 - 0.5 * gone)
 
 
-@kernel
+@inner_kernel
 def fault_actuators_end(planned: FloatArray, x: FloatArray) -> None:
     """Put the failed actuators where they are after the plant's step.
 

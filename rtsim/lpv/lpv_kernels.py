@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.signals import SCHEDULING_SPEED
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.units import GRAVITY
 
 FloatArray = npt.NDArray[np.float64]
@@ -105,18 +105,18 @@ class LpvTables(NamedTuple):
     """Form, sizes and positions of the variables that have a meaning here (``R_*``)."""
 
 
-@kernel
+@inner_kernel
 def _rows_at(tables: LpvTables) -> int:
     """Where the row sums stand in the work array; the scratch vectors follow at `_scratch_at`."""
     return W_BLEND + max(tables.cells.shape[3], tables.output_cells.shape[3])
 
 
-@kernel
+@inner_kernel
 def _scratch_at(tables: LpvTables) -> int:
     return _rows_at(tables) + max(tables.roles[R_ROWS], tables.roles[R_OUTPUT_ROWS])
 
 
-@kernel
+@inner_kernel
 def work_size(tables: LpvTables) -> int:
     """Give the length of the work array that the kernels need.
 
@@ -129,7 +129,7 @@ def work_size(tables: LpvTables) -> int:
     return _scratch_at(tables) + 4 * tables.roles[R_STATES] + 2 * tables.roles[R_INPUTS]
 
 
-@kernel
+@inner_kernel
 def _cell_below(axis: FloatArray, value: float) -> int:
     """Number of the grid interval that holds a value (clipped to the first and last)."""
     low = 0
@@ -143,7 +143,7 @@ def _cell_below(axis: FloatArray, value: float) -> int:
     return low
 
 
-@kernel
+@inner_kernel
 def _smoothstep(s: float) -> float:
     if s <= 0.0:
         return 0.0
@@ -152,7 +152,7 @@ def _smoothstep(s: float) -> float:
     return s * s * (3.0 - 2.0 * s)
 
 
-@kernel
+@inner_kernel
 def _layer_step(alpha: float, here: float, beyond: float) -> float:
     """How far the angle of attack has gone from one layer towards the next, smoothed, in [0, 1]."""
     gap = beyond - here
@@ -163,7 +163,7 @@ def _layer_step(alpha: float, here: float, beyond: float) -> float:
     return fade * _smoothstep((alpha - here) / gap)
 
 
-@kernel
+@inner_kernel
 def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
     """Angle of attack as used for scheduling: with a headwind of V0 added, so that it is defined in hover.
 
@@ -183,7 +183,7 @@ def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
     return math.atan2(w + headwind * sine, u + headwind * cosine)
 
 
-@kernel
+@inner_kernel
 def _locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatArray) -> tuple[int, int]:
     """Find the cell of the present state: corner weights, layer shares and flags into ``work``."""
     roles = tables.roles
@@ -261,7 +261,7 @@ def _locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatA
     return i, j
 
 
-@kernel
+@inner_kernel
 def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArray) -> float:
     return (
         work[W_CORNER] * tables.alpha[i, j, layer]
@@ -271,7 +271,7 @@ def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArra
     )
 
 
-@kernel
+@inner_kernel
 def _blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, target: FloatArray) -> None:
     """Interpolate the first ``count`` entries of the cells around (i, j)."""
     fresh = True
@@ -296,7 +296,7 @@ def _blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, targ
                 target[k] += w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
 
 
-@kernel
+@inner_kernel
 def _apply(
     tables: LpvTables,
     x: FloatArray,
@@ -335,7 +335,7 @@ def _apply(
         _add_rigid_body(roles, x, xdot)
 
 
-@kernel
+@inner_kernel
 def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
     """Add gravity, Coriolis and kinematics of the symmetric plane (body axes, z down, altitude up)."""
     u = x[roles[R_U]]
@@ -350,7 +350,7 @@ def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
     xdot[roles[R_ALTITUDE]] += u * sine - w * cosine
 
 
-@kernel
+@inner_kernel
 def lpv_derivative(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, xdot: FloatArray, work: FloatArray
 ) -> None:
@@ -383,7 +383,7 @@ def lpv_derivative(
     )
 
 
-@kernel
+@inner_kernel
 def lpv_outputs(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, y: FloatArray, work: FloatArray
 ) -> None:
@@ -427,7 +427,7 @@ def lpv_outputs(
         y[k] = total[k]
 
 
-@kernel
+@inner_kernel
 def lpv_step(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_path: FloatArray, dt: float, work: FloatArray
 ) -> None:
@@ -490,7 +490,7 @@ def lpv_step(
         x[k] += dt / 6.0 * total[k]
 
 
-@kernel
+@inner_kernel
 def lpv_step_steady(
     tables: LpvTables,
     x: FloatArray,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.compiled import kernel
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 from rtsim.ramp_filter_kernels import critically_damped_ramp
 
@@ -52,7 +52,7 @@ class NacelleTables(NamedTuple):
     """Angles at which the switch stops the nacelles, ascending, shape (n,) [rad]."""
 
 
-@kernel
+@inner_kernel
 def nacelle_effective_rate(tables: NacelleTables, state: FloatArray, rate: float, dt: float) -> float:
     """Ramp rate of the command angle over one frame that keeps it within the stops.
 
@@ -73,7 +73,7 @@ def nacelle_effective_rate(tables: NacelleTables, state: FloatArray, rate: float
     return rate
 
 
-@kernel
+@inner_kernel
 def nacelle_at(tables: NacelleTables, state: FloatArray, rate: float, elapsed: float, out: FloatArray) -> None:
     """Motion of the nacelle at a time within the frame, exact for a command ramp.
 
@@ -87,7 +87,7 @@ def nacelle_at(tables: NacelleTables, state: FloatArray, rate: float, elapsed: f
     out[0], out[1], out[2] = critically_damped_ramp(tables.frequency, state[0], rate, state[1], state[2], elapsed)
 
 
-@kernel
+@inner_kernel
 def nacelle_path(tables: NacelleTables, state: FloatArray, rate: float, dt: float, path: FloatArray) -> None:
     """Motion at the start, middle and end of a frame, for the stages of a Runge-Kutta step.
 
@@ -103,7 +103,7 @@ def nacelle_path(tables: NacelleTables, state: FloatArray, rate: float, dt: floa
     nacelle_at(tables, state, rate, dt, path[2])
 
 
-@kernel
+@inner_kernel
 def nacelle_advance(tables: NacelleTables, state: FloatArray, rate: float, dt: float) -> None:
     """Advance the actuator by one frame.
 
@@ -125,7 +125,7 @@ def nacelle_advance(tables: NacelleTables, state: FloatArray, rate: float, dt: f
         state[2] = min(state[2], 0.0)
 
 
-@kernel
+@inner_kernel
 def on_downstop(tables: NacelleTables, angle: float) -> bool:
     """Tell whether the nacelles rest on the airplane-mode stop.
 
@@ -136,7 +136,7 @@ def on_downstop(tables: NacelleTables, angle: float) -> bool:
     return angle <= tables.downstop
 
 
-@kernel
+@inner_kernel
 def nacelle_assigned_rate(tables: NacelleTables, wanted: float) -> float:
     """Limit the rate that a scenario or an automatic law asks for.
 
@@ -150,7 +150,7 @@ def nacelle_assigned_rate(tables: NacelleTables, wanted: float) -> float:
     return min(max(wanted, -tables.assigned_rate), tables.assigned_rate)
 
 
-@kernel
+@inner_kernel
 def switch_rate_limit(tables: NacelleTables, command_angle: float) -> float:
     """Rate at which the pilot's switch moves the nacelles here; slow near the stops.
 
@@ -168,7 +168,7 @@ def switch_rate_limit(tables: NacelleTables, command_angle: float) -> float:
     return tables.switch_rate
 
 
-@kernel
+@inner_kernel
 def next_detent(tables: NacelleTables, command_angle: float, direction: float) -> float:
     """The next angle at which a run in this direction ends: a detent, or the forward stop.
 
@@ -193,7 +193,7 @@ def next_detent(tables: NacelleTables, command_angle: float, direction: float) -
     return tables.forward_stop
 
 
-@kernel
+@inner_kernel
 def nacelle_switch_step(
     tables: NacelleTables, switch: FloatArray, pressed: float, command_angle: float, dt: float
 ) -> float:
