@@ -249,6 +249,7 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         seed=options.seed,
         wind=kt(options.wind_kt),
         pilot_noise=options.pilot_noise,
+        aids=tuple(dict.fromkeys(options.aids)),
         events=tuple(
             ScenarioEvent(event.time_s, event.pilot) for event in sorted(content.events, key=lambda event: event.time_s)
         ),

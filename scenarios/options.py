@@ -10,6 +10,7 @@ from rtsim.errors import InputError
 from rtsim.programme import AIRSPEED_RANGE, ALTITUDE_RANGE, NACELLE_RANGE, Programme, ProgrammePoint
 from rtsim.units import kt, to_deg, to_kt
 from scenarios.loader import load_scenario, named_start
+from scenarios.pilots import HAND_PILOT
 from scenarios.scenario import DEFAULT_ALTITUDE, CorridorName, OuterLoop, PlantName, Protection, Scenario
 
 DEFAULT_SCENARIO = "typical_conversion"
@@ -165,6 +166,10 @@ def _displaced(scenario: Scenario, overrides: Overrides) -> Scenario:
         _check_range("--altitude-m", overrides.altitude, ALTITUDE_RANGE, "m")
         return _raised(scenario, overrides.altitude - scenario.start.altitude)
     start = _start_point(overrides, scenario.start)
+    if scenario.programme.duration == 0.0 and HAND_PILOT in {overrides.pilot, scenario.pilot}:
+        # A hand flight has no programme to join: the virtual pilot holds whatever start is asked for.
+        programme = Programme.hold(airspeed=start.airspeed, nacelle_angle=start.nacelle_angle, altitude=start.altitude)
+        return dataclasses.replace(scenario, programme=programme, start=start)
     time, where = _joining_time(scenario.programme, start)
     if time is None:
         raise InputError(

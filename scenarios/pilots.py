@@ -17,6 +17,8 @@ ENTRY_POINT_GROUP = "rtsim.pilots"
 """Group under which an installed package offers pilots by name."""
 BUILT_IN_PILOT = "mocm"
 """The pilot that needs no plug-in."""
+HAND_PILOT = "mavlink"
+"""A person behind MAVLink; the built-in pilot holds the start until the first sticks arrive."""
 
 PilotFactory = Callable[[], Pilot]
 
@@ -25,25 +27,17 @@ def load_pilot(name: str) -> PilotFactory | None:
     """The plug-in behind a pilot's name.
 
     Args:
-        name: ``mocm``, an entry point's name, or ``MODULE:CLASS``; modules are also looked for in the current
-            directory.
+        name: ``mocm``, ``mavlink``, an entry point's name, or ``MODULE:CLASS``; modules are also looked for in the
+            current directory.
 
     Returns:
-        Something that makes a fresh pilot, or None for the built-in one.
+        Something that makes a fresh pilot, or None for the built-in one and a person behind MAVLink.
 
     Raises:
         InputError: If there is no such pilot, or it has no ``step`` method.
     """
-    if name == BUILT_IN_PILOT:
+    if name in {BUILT_IN_PILOT, HAND_PILOT}:
         return None
-    if name == "mavlink":
-        raise InputError(
-            "flying by MAVLink is not in this version yet",
-            key="--pilot",
-            value=name,
-            allowed="mocm, MODULE:CLASS",
-            mend="choose another pilot",
-        )
     target = _from_module(name) if ":" in name else _from_entry_point(name)
     if not callable(target) or not callable(getattr(target, "step", None)):
         raise InputError(
@@ -108,7 +102,7 @@ def _from_module(name: str) -> Any:
 def _from_entry_point(name: str) -> Any:
     offered = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
     if name not in offered:
-        choices = [BUILT_IN_PILOT, *offered]
+        choices = [BUILT_IN_PILOT, HAND_PILOT, *offered]
         raise InputError(
             "is not a pilot",
             key="--pilot",

@@ -53,6 +53,8 @@ class FlightRecord(Mapping[str, FloatArray]):
     """The scenario's expectations, judged."""
     database_hash: str
     """Hash of the LPV database that was flown."""
+    mavlink: Mapping[str, Any] | None = None
+    """What passed by MAVLink: port, age of the sticks, counts; None where there was none."""
     failure: OutputError | None = None
     """The log or view that failed while the flight went on; None where all was well."""
 
@@ -113,6 +115,8 @@ class FlightRecord(Mapping[str, FloatArray]):
             "database_sha256": self.database_hash,
         }
         result.update(asdict(self.metrics) if self.metrics is not None else {})
+        if self.mavlink is not None:
+            result["mavlink"] = dict(self.mavlink)
         result["expectations"] = [asdict(verdict) for verdict in self.verdicts]
         return result
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.aids import AIDS
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256
@@ -97,7 +98,7 @@ def fly_recording(simulation: Simulation, recorded: FloatArray, events: Sequence
     Returns:
         The replayed history, shape (rows flown, SIGNAL_COUNT).
     """
-    acting = [event for event in events if event.kind in {"reset", "pilot"}]
+    acting = [event for event in events if event.kind in {"reset", "pilot", "aid"}]
     replayed = np.empty_like(recorded)
     due = 0
     for row in range(len(recorded)):
@@ -148,6 +149,11 @@ def first_difference(recorded: FloatArray, replayed: FloatArray) -> Difference |
 def _act(simulation: Simulation, event: LogEvent) -> None:
     if event.kind == "reset":
         simulation.reset()
+        return
+    if event.kind == "aid":
+        for aid in AIDS:
+            if aid == event.data["aid"]:
+                simulation.set_aid(aid, bool(event.data["on"]))
         return
     mode = str(event.data["mode"])
     for name in MODES:

@@ -23,6 +23,7 @@ from rtsim.realtime import Executive, FlightControl, OverrunPolicy
 from rtsim.realtime.report import TimingReport
 from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import to_deg, to_kt
+from scenarios.hands import Hands, MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
 from scenarios.loader import load_scenario
 from scenarios.metrics import flight_metrics
 from scenarios.options import Overrides, refuse_unavailable, with_overrides
@@ -35,6 +36,7 @@ from telemetry.corridor_outline import CorridorOutline
 from telemetry.log_format import FlightMetadata, LogEvent
 
 if TYPE_CHECKING:
+    from telemetry.mavlink import MavlinkLink
     from telemetry.recorder import Recorder
     from telemetry.rerun_view import RerunView
     from telemetry.view_options import ViewOptions
@@ -53,6 +55,8 @@ class FlightOutputs:
     """Replace an earlier log at that path."""
     view: ViewOptions | None = None
     """Rerun view and recording; None shows nothing."""
+    mavlink: MavlinkOptions | None = None
+    """Ground stations; None talks no MAVLink, unless the pilot is behind it."""
     on_message: Callable[[str], None] | None = None
     """Told what the view has to say, one sentence at a time."""
     on_rows: Callable[[FloatArray], None] | None = None
@@ -98,30 +102,39 @@ def fly(
     outputs = outputs if outputs is not None else FlightOutputs()
     pilot_factory = load_pilot(scenario.pilot)
     live = speed != "max"
+    control = control if control is not None else FlightControl()
+    link: MavlinkLink | None = None
     log: Recorder | None = None
     # The view needs a second to start, in its own process, while this one loads the aircraft.
     view = _start_view(scenario, outputs)
     try:
+        link = _start_mavlink(scenario, outputs, live=live)
         simulation = Simulation(flight_setup(scenario))
+        waits = flown_by_hand(scenario.pilot)
+        hands = Hands(link, simulation, control=control, waits=waits) if link is not None else None
         session = FlightSession(
             simulation,
             frames=flight_frames(scenario),
             events=scenario.events,
             pilot_factory=pilot_factory,
             pilot_name=scenario.pilot,
+            hands=hands,
         )
         log = _start_log(scenario, simulation, outputs, live=live)
         sinks = FlightSinks(
             log=log,
             view=view,
+            mirror=link,
             watch_corridor=scenario.protection != "off",
             on_rows=outputs.on_rows,
-            on_event=outputs.on_event,
+            on_event=_event_listener(outputs, link),
         )
         session.on_event = sinks.event
         simulation.warm_up()
         if view is not None and live:
             view.wait_ready(VIEW_PATIENCE_S)
+        if link is not None:
+            link.wait_ready()
         executive = Executive(
             session, sinks, control=control, speed=math.inf if speed == "max" else speed, policy=policy
         )
@@ -129,10 +142,14 @@ def fly(
             outputs.on_start()
         timing = executive.fly()
         record = _measure(scenario, session, sinks, timing, simulation.database_hash)
+        if hands is not None:
+            record = dataclasses.replace(record, mavlink=hands.summary())
     except BaseException:
         _close(log, view, None)
+        _close_mavlink(link)
         raise
-    return dataclasses.replace(record, failure=_close(log, view, record))
+    link_failure = _close_mavlink(link)
+    return dataclasses.replace(record, failure=_close(log, view, record) or link_failure)
 
 
 def flight_frames(scenario: Scenario) -> int:
@@ -163,6 +180,7 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         wind=scenario.wind,
         seed=scenario.seed,
         pilot_noise=scenario.pilot_noise,
+        aids=scenario.aids,
     )
 
 
@@ -254,6 +272,41 @@ def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
         rate_hz=scenario.rate_hz,
         on_message=outputs.on_message,
     )
+
+
+def _start_mavlink(scenario: Scenario, outputs: FlightOutputs, *, live: bool) -> MavlinkLink | None:
+    """Put the aircraft on the air, in a process that gets ready while this one loads it."""
+    if outputs.mavlink is None and not flown_by_hand(scenario.pilot):
+        return None
+    refuse_unpaced(scenario, paced=live)
+    from telemetry.mavlink import MavlinkLink
+
+    config, warning = mavlink_config(outputs.mavlink or MavlinkOptions(), scenario)
+    if warning is not None and outputs.on_message is not None:
+        outputs.on_message(warning)
+    return MavlinkLink(config)
+
+
+def _event_listener(outputs: FlightOutputs, link: MavlinkLink | None) -> Callable[[LogEvent], None] | None:
+    """Who hears of events: the caller, and the ground stations of what they cannot see in the rows."""
+    heard = outputs.on_event
+    if link is None:
+        return heard
+
+    def tell(event: LogEvent) -> None:
+        if event.kind in {"pilot", "aid", "end"}:
+            link.say(event.text, severity=4 if event.level == "warning" else 6)
+        if heard is not None:
+            heard(event)
+
+    return tell
+
+
+def _close_mavlink(link: MavlinkLink | None) -> OutputError | None:
+    if link is None:
+        return None
+    link.close()
+    return link.failure
 
 
 def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutputs, *, live: bool) -> Recorder | None:

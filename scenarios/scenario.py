@@ -13,6 +13,8 @@ OuterLoop = Literal["integrators", "pi"]
 CorridorName = Literal["design", "flight"]
 Protection = Literal["off", "monitor", "governor", "full"]
 PilotMode = Literal["mocm", "external", "hold"]
+AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
+"""The pilot aids of ``rtsim.aids``, named here so that reading a file loads no compiled code."""
 
 START_CONDITIONS: dict[str, tuple[float, float]] = {
     "hover": (0.0, deg(90.0)),
@@ -94,6 +96,8 @@ class Scenario:
     """Steady wind along the flight [m/s], tailwind positive."""
     pilot_noise: bool
     """Whether the MOCM's motor and observation noise is on."""
+    aids: tuple[AidName, ...]
+    """Pilot aids on at the start; they act on every pilot but the MOCM."""
     events: tuple[ScenarioEvent, ...]
     expectations: tuple[Expectation, ...]
     source: str

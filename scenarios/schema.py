@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from scenarios.scenario import AidName
+
 FORMAT = 1
 """Version of the layout; a file states it, so that later layouts can still read it."""
 
@@ -42,6 +44,7 @@ class FlightTable(Strict):
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     wind_kt: Annotated[float, Field(ge=-40.0, le=40.0, allow_inf_nan=False)] = 0.0
     pilot_noise: bool = False
+    aids: list[AidName] = []
 
 
 class StartTable(Strict):

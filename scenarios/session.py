@@ -7,10 +7,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from rtsim.aids import AidName
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_COUNT, FloatArray
-from rtsim.simulation import Simulation
+from rtsim.simulation import END_REASONS, Simulation
+from rtsim.simulation_kernels import END_GENTLE_LANDING
+from scenarios.hands import Hands, pilot_modes
 from scenarios.pilots import PilotFactory
 from scenarios.scenario import PilotMode, ScenarioEvent
 from telemetry.log_format import LogEvent
@@ -21,6 +24,10 @@ PILOT_WORDS: dict[PilotMode, str] = {
     "hold": "the controls are held",
 }
 """What a hand-over to each mode means, for people."""
+HAND_WORDS = "your sticks fly"
+"""The same for the mode ``external`` where a person holds the sticks."""
+GENTLE_END = END_REASONS[END_GENTLE_LANDING].split(",", maxsplit=1)[0]
+"""How the end reason of a gentle landing begins."""
 
 
 class FlightSession:
@@ -38,6 +45,7 @@ class FlightSession:
         events: Sequence[ScenarioEvent] = (),
         pilot_factory: PilotFactory | None = None,
         pilot_name: str = "mocm",
+        hands: Hands | None = None,
     ) -> None:
         """Prepare a flight from the simulation's present state, which must be frame 0.
 
@@ -47,6 +55,7 @@ class FlightSession:
             events: What the scenario makes happen, in order of time.
             pilot_factory: Makes the pilot plug-in; None where the built-in pilot flies alone.
             pilot_name: How the pilot is called in messages.
+            hands: A person who may fly by MAVLink; None where there is no MAVLink.
         """
         self.simulation = simulation
         self.rows = 0
@@ -58,6 +67,7 @@ class FlightSession:
         self._next_due = 0
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
         self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
+        self._hands = hands
         self._failure = ""
 
     @property
@@ -72,8 +82,10 @@ class FlightSession:
 
     @property
     def completed(self) -> bool:
-        """Whether it was flown to its length."""
-        return not self._failure and not self.simulation.finished and self.simulation.frame_index >= self._frames
+        """Whether it was flown to its length, or by hand to a gentle landing."""
+        if self.simulation.finished:
+            return self._hands is not None and self.simulation.end_reason.startswith(GENTLE_END)
+        return not self._failure and self.simulation.frame_index >= self._frames
 
     @property
     def end_reason(self) -> str:
@@ -94,11 +106,16 @@ class FlightSession:
             self._start_due_events()
         simulation = self.simulation
         command = None
-        if self._pilot is not None and simulation.mode == "external":
+        hands = self._hands
+        if hands is not None:
+            command = hands.before(self)
+        elif self._pilot is not None and simulation.mode == "external":
             command = self._ask_pilot(self._pilot)
         # A run of one frame is the same frame as a step, in one call of compiled code instead of three.
         row: FloatArray = simulation.run(1)[0] if command is None else simulation.step(command)
         self.rows += 1
+        if hands is not None:
+            hands.after(row, simulation.dt)
         return row
 
     def run(self, frames: int) -> FloatArray:
@@ -115,7 +132,7 @@ class FlightSession:
             self._start_due_events()
         if self._next_due < len(self._due):
             frames = min(frames, self._due[self._next_due][0] - self.simulation.frame_index)
-        if self._pilot is None or self.simulation.mode != "external":
+        if self._hands is None and (self._pilot is None or self.simulation.mode != "external"):
             rows = self.simulation.run(frames)
             self.rows += len(rows)
             return rows
@@ -133,6 +150,8 @@ class FlightSession:
         self._next_due = 0
         if self._pilot_factory is not None:
             self._pilot = self._pilot_factory()
+        if self._hands is not None:
+            self._hands.reset(self.simulation)
 
     def switch_pilot(self, pilot: str) -> None:
         """Hand the controls over from the coming frame on.
@@ -143,18 +162,40 @@ class FlightSession:
         Raises:
             InputError: If there is no such pilot in this flight.
         """
-        available: list[PilotMode] = ["mocm", "hold"] if self._pilot is None else ["mocm", "external", "hold"]
+        available = list(pilot_modes(plug_in=self._pilot is not None, hands=self._hands is not None))
         present = self.simulation.mode
         if pilot == "next":
             pilot = available[(available.index(present) + 1) % len(available)]
         for mode in available:
             if mode == pilot:
-                self._tell("pilot", PILOT_WORDS[mode], {"mode": mode})
+                by_hand = mode == "external" and self._hands is not None
+                self._tell("pilot", HAND_WORDS if by_hand else PILOT_WORDS[mode], {"mode": mode})
                 self.simulation.set_pilot(mode)
+                if by_hand and self._hands is not None:
+                    self._hands.engage()
                 return
         raise InputError(
             "is not a pilot of this flight", key="pilot", value=pilot, allowed=", ".join(available), mend="choose one"
         )
+
+    def switch_aid(self, name: AidName, *, on: bool) -> None:
+        """Switch a pilot aid from the coming frame on.
+
+        Args:
+            name: The aid.
+            on: On or off.
+        """
+        self._tell("aid", f"{name.replace('_', ' ')} {'on' if on else 'off'}", {"aid": name, "on": int(on)})
+        self.simulation.set_aid(name, on)
+
+    def tell(self, kind: str, text: str) -> None:
+        """Make an event that changes nothing a replay would need.
+
+        Args:
+            kind: One word, for programs.
+            text: One line, for people.
+        """
+        self._tell(kind, text)
 
     def _start_due_events(self) -> None:
         frame = self.simulation.frame_index
@@ -180,7 +221,7 @@ class FlightSession:
         self.switch_pilot("hold")
         return None
 
-    def _tell(self, kind: str, text: str, data: dict[str, str] | None = None, *, level: str = "info") -> None:
+    def _tell(self, kind: str, text: str, data: dict[str, str | int] | None = None, *, level: str = "info") -> None:
         if self.on_event is not None:
             time = self.simulation.frame_index * self.dt
             details = {"row": self.rows, **(data or {})}

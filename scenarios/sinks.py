@@ -94,6 +94,19 @@ class RowView(Protocol):
         ...
 
 
+class RowMirror(Protocol):
+    """Whatever else is shown every row of a paced flight; nothing of it may wait."""
+
+    def push(self, row: FloatArray, timing: FloatArray) -> None:
+        """Show one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Timing columns of the frame before.
+        """
+        ...
+
+
 class History:
     """All rows of a flight, kept in chunks."""
 
@@ -143,6 +156,7 @@ class FlightSinks:
         *,
         log: RowLog | None = None,
         view: RowView | None = None,
+        mirror: RowMirror | None = None,
         watch_corridor: bool = True,
         on_rows: Callable[[FloatArray], None] | None = None,
         on_event: Callable[[LogEvent], None] | None = None,
@@ -152,6 +166,7 @@ class FlightSinks:
         Args:
             log: Keeps every row and event.
             view: Shows what it can.
+            mirror: Shown every row of a paced flight beside the view (MAVLink).
             watch_corridor: Make events of changes of the corridor level.
             on_rows: Told the last row flown (progress and status lines); must be quick.
             on_event: Told every event; must be quick.
@@ -159,6 +174,7 @@ class FlightSinks:
         self.history = History()
         self.events: list[LogEvent] = []
         self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
+        self._mirror = mirror
         self._watch_corridor = watch_corridor
         self._level = 0.0
         self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
@@ -173,6 +189,8 @@ class FlightSinks:
         if self._view is not None:
             timing[_DROPPED] = self._view.dropped
             self._view.push(row, timing)
+        if self._mirror is not None:
+            self._mirror.push(row, timing)
 
     def record(self, row: FloatArray, timing: FloatArray) -> None:
         """Keep a row.

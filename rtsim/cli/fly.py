@@ -42,7 +42,7 @@ def fly_command(
         typer.Argument(help="Name of a scenario, or path of a .toml file.", show_default="typical_conversion"),
     ] = None,
     *,
-    pilot: Annotated[str | None, typer.Option(help="mocm, an installed pilot, or MODULE:CLASS.")] = None,
+    pilot: Annotated[str | None, typer.Option(help="mocm, mavlink, an installed pilot, or MODULE:CLASS.")] = None,
     plant: Annotated[Literal["lpv", "lpv-plain", "nonlinear"] | None, typer.Option(help="Model to fly.")] = None,
     outer_loop: Annotated[
         Literal["integrators", "pi"] | None, typer.Option(help="How the MOCM holds airspeed and altitude.")
@@ -66,7 +66,21 @@ def fly_command(
     layout: Annotated[Literal["pilot", "engineer"], typer.Option(help="Layout of the viewer.")] = "pilot",
     log: Annotated[Path | None, typer.Option(help="Write the flight log PATH.parquet (a directory).")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier log at that path.")] = False,
-    mavlink: Annotated[list[str] | None, typer.Option(help="Send MAVLink to HOST:PORT (not in this version).")] = None,
+    mavlink: Annotated[
+        list[str] | None, typer.Option(help="Send MAVLink to HOST:PORT, repeatable.", show_default="127.0.0.1:14550")
+    ] = None,
+    mavlink_bind: Annotated[
+        str | None, typer.Option(help="Receive MAVLink on HOST:PORT.", show_default="a free port")
+    ] = None,
+    mavlink_network: Annotated[
+        bool, typer.Option("--mavlink-network", help="Let MAVLink leave this machine. It has no authentication.")
+    ] = False,
+    mavlink_key: Annotated[Path | None, typer.Option(help="Sign MAVLink with the key in FILE.")] = None,
+    mavlink_parameters: Annotated[Path | None, typer.Option(help="Where MAVLink parameters are stored.")] = None,
+    stick_map: Annotated[str | None, typer.Option(help="Vehicle stick map: a name or a .toml file.")] = None,
+    autopilot: Annotated[
+        Literal["px4", "generic"], typer.Option(help="How ground stations read the flight modes.")
+    ] = "px4",
     overrun_policy: Annotated[str, typer.Option(help="catch-up, or stop:N to end at the Nth overrun.")] = "catch-up",
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
@@ -97,6 +111,12 @@ def fly_command(
         log: Flight log to write.
         overwrite: Replace an earlier log.
         mavlink: Where to send MAVLink.
+        mavlink_bind: Where to receive MAVLink.
+        mavlink_network: Let MAVLink leave this machine.
+        mavlink_key: Signing key.
+        mavlink_parameters: Where MAVLink parameters are stored.
+        stick_map: Vehicle stick map.
+        autopilot: How ground stations read the flight modes.
         overrun_policy: What to do about overruns.
         json: Print one JSON object on stdout.
 
@@ -108,12 +128,8 @@ def fly_command(
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
     from scenarios.options import Overrides, chosen_scenario, refuse_unavailable
-    from scenarios.pilots import load_pilot
+    from scenarios.pilots import HAND_PILOT, load_pilot
 
-    if mavlink:
-        raise InputError(
-            "sending MAVLink is not in this version yet", key="--mavlink", value=mavlink[0], mend="leave it out"
-        )
     OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
         plant=plant,
@@ -135,12 +151,27 @@ def fly_command(
     chosen = chosen_scenario(scenario, overrides)
     refuse_unavailable(chosen)
     load_pilot(chosen.pilot)
+    link = None
+    if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
+        from scenarios.hands import MavlinkOptions, mavlink_config, refuse_unpaced
+
+        link = MavlinkOptions(
+            targets=tuple(mavlink or ()),
+            bind=mavlink_bind,
+            allow_network=mavlink_network,
+            signing_key=mavlink_key,
+            parameter_file=mavlink_parameters,
+            stick_map=stick_map,
+            autopilot=autopilot,
+        )
+        refuse_unpaced(chosen, paced=not math.isinf(pace))
+        mavlink_config(link, chosen)  # mistakes are told before anything starts
     view = _view_options(headless=headless, record=record, layout=layout)
     flight, first_frame_s, code = _fly(
         chosen,
         speed=pace,
         view=view,
-        outputs={"log": log, "overwrite": overwrite},
+        outputs={"log": log, "overwrite": overwrite, "mavlink": link},
         policy=overrun_policy,
     )
     if json:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -40,6 +41,8 @@ class FlightControl:
         """What has been asked and not served yet."""
         self.paused = False
         """Whether the flight stands still."""
+        self.poll: Callable[[], None] | None = None
+        """Called every few milliseconds while the flight stands still, so that whoever asks from outside is heard."""
         self.speed = 1.0
         """Present speed in multiples of real time; infinite while it is not paced."""
 

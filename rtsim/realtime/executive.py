@@ -239,6 +239,8 @@ class Executive:
                 self._end_section(wait=False)
                 pause_start = time.perf_counter_ns()
             time.sleep(PAUSE_POLL_S)
+            if self.control.poll is not None:
+                self.control.poll()
         if pause_start:
             now = time.perf_counter_ns()
             self._paused_ns += now - pause_start

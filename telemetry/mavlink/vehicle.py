@@ -320,6 +320,8 @@ class Vehicle:
     def farewell(self) -> None:
         """Tell every station that the flight is over."""
         self.state.armed = False
+        for severity, text in self._exchange.take_texts():
+            self.board.say(severity, text)
         self.board.say(INFO, "Flight over")
         while (notice := self.board.take(self.now)) is not None:
             self.broadcast(dialect.MAVLink_statustext_message(notice.severity, notice.text.encode()))

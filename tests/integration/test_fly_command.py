@@ -98,10 +98,10 @@ def test_a_failed_expectation_is_exit_1(tmp_path: Path, capsys: pytest.CaptureFi
     [
         (["hovr"], "perhaps 'hover' is meant"),
         (["none.toml"], "does not exist"),
-        (["--pilot", "mavlink"], "not in this version"),
+        (["--pilot", "mavlink", "--speed", "max"], "MAVLink needs a paced flight"),
         (["--protection", "governor"], "off, monitor"),
         (["--protection", "much"], "--protection"),
-        (["--mavlink", "127.0.0.1:14550"], "not in this version"),
+        (["--mavlink", "192.0.2.1:14550"], "--mavlink-network"),
         (["--speed", "fast"], "0.001 to 1000"),
         (["--speed", "0"], "0.001 to 1000"),
         (["--rate", "20"], "50 to 1000 Hz"),

@@ -131,7 +131,7 @@ def test_starts(name: str | None, changes: dict[str, Any], duration: float) -> N
         ("hover", {"wind": kt(50.0)}, "-40 to 40 kn"),
         ("hover", {"seed": -1}, "--seed"),
         ("hover", {"protection": "full"}, "off, monitor"),
-        ("hover", {"pilot": "mavlink"}, "not in this version"),
+        ("hover", {"pilot": "mavlink"}, "MAVLink needs a paced flight"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_in_one_sentence(name: str | None, changes: dict[str, Any], words: str) -> None:
@@ -230,7 +230,7 @@ def test_a_failing_pilot_ends_the_flight_with_a_named_reason(name: str, frames: 
         ("no_module:X", "there is no module no_module"),
         ("needy_module:X", "needs no_such_package"),
         ("broken_module:X", "ZeroDivisionError"),
-        ("nobody", "allowed: mocm, MODULE:CLASS"),
+        ("nobody", "allowed: mocm, mavlink, MODULE:CLASS"),
     ],
 )
 def test_pilots_that_do_not_exist(pilot: str, words: str) -> None:

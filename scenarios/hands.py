@@ -1,0 +1,350 @@
+"""A person's hands in a flight: sticks and requests from MAVLink become commands, switches and hand-overs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args
+
+import rtsim
+from rtsim.aids import AIDS, AidName
+from rtsim.aids.aids_kernels import MAP_STICK, scheduled
+from rtsim.command import Command
+from rtsim.corridor import load_corridor
+from rtsim.errors import InputError
+from rtsim.frame import COLUMN, FloatArray
+from rtsim.realtime import FlightControl
+from rtsim.simulation import PilotMode, Simulation
+from rtsim.sticks import INPUT_LIVE, INPUT_NONE, StickHandler, StickSettings, StickSituation, transition_schedule
+from rtsim.units import KNOT, deg
+from scenarios.pilots import HAND_PILOT
+from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
+from telemetry.mavlink import Feedback, HomePosition, MavlinkConfig, MavlinkLink, Request
+from telemetry.mavlink.config import endpoints
+
+if TYPE_CHECKING:
+    from scenarios.scenario import Scenario
+
+_WATCH_FRAMES = 64
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MavlinkOptions:
+    """How a flight talks MAVLink."""
+
+    targets: tuple[str, ...] = ()
+    """``HOST:PORT`` of ground stations; empty takes 127.0.0.1:14550."""
+    bind: str | None = None
+    """``HOST:PORT`` to receive on; None takes a free loopback port."""
+    allow_network: bool = False
+    """Whether MAVLink may leave this machine."""
+    signing_key: Path | None = None
+    """File with the signing key."""
+    parameter_file: Path | None = None
+    """Where parameters are stored on request; None takes the user's own place."""
+    stick_map: str | None = None
+    """Stick map of the vehicle: a library name or a file."""
+    autopilot: Literal["px4", "generic"] = "px4"
+    """How ground stations decode modes."""
+    reboot_resets: bool = False
+    """Let the reboot command reset the flight."""
+    home: HomePosition = field(default_factory=HomePosition)
+    """Start of the flight on the globe."""
+
+
+def default_parameter_file() -> Path:
+    """Where parameters are stored where nothing else is said: the user's configuration directory."""
+    base = os.environ.get("XDG_CONFIG_HOME")
+    return (Path(base) if base else Path.home() / ".config") / "rtsim" / "mavlink_parameters.toml"
+
+
+def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[MavlinkConfig, str | None]:
+    """Settings of the vehicle of a flight.
+
+    Args:
+        options: What the user wants.
+        scenario: What is flown.
+
+    Returns:
+        The settings, and a warning to print or None.
+
+    Raises:
+        InputError: An address, the key or the stick map is wrong.
+    """
+    targets, host, port, warning = endpoints(options.targets, allow_network=options.allow_network, bind=options.bind)
+    stick_map = load_vehicle_map(options.stick_map)
+    parameter_file = options.parameter_file or default_parameter_file()
+    config = MavlinkConfig(
+        targets=targets,
+        bind_host=host,
+        bind_port=port,
+        autopilot=options.autopilot,
+        rate_hz=float(scenario.rate_hz),
+        home=options.home,
+        aids={name: name in scenario.aids for name in AIDS},
+        parameters=stick_settings(stick_map).parameters(),
+        parameter_file=str(parameter_file),
+        axes={str(control): source for control, source in stick_map.axes.items()},
+        buttons={str(function): bit for function, bit in stick_map.buttons.items()},
+        signing_key_file=str(options.signing_key) if options.signing_key else None,
+        reboot_resets=options.reboot_resets,
+        title=scenario.name,
+        version=rtsim.__version__,
+    )
+    return config, warning
+
+
+def stick_settings(stick_map: VehicleMap) -> StickSettings:
+    """Shaping and nacelle switch of a stick map.
+
+    Args:
+        stick_map: The map.
+    """
+    return StickSettings(
+        dead_band=stick_map.shape.dead_band,
+        expo=stick_map.shape.expo,
+        scale=stick_map.shape.scale,
+        detents=stick_map.nacelle.detents,
+        nacelle_rate=deg(stick_map.nacelle.rate_deg_s),
+    )
+
+
+class HandedFlight(Protocol):
+    """What the hands need of the flight they are in."""
+
+    @property
+    def simulation(self) -> Simulation:
+        """What flies."""
+        ...
+
+    def switch_pilot(self, pilot: str) -> None:
+        """Hand the controls over.
+
+        Args:
+            pilot: A mode's name, or ``next``.
+        """
+        ...
+
+    def switch_aid(self, name: AidName, *, on: bool) -> None:
+        """Switch a pilot aid.
+
+        Args:
+            name: The aid.
+            on: On or off.
+        """
+        ...
+
+    def tell(self, kind: str, text: str) -> None:
+        """Make an event that changes nothing.
+
+        Args:
+            kind: One word, for programs.
+            text: One line, for people.
+        """
+        ...
+
+
+class Hands:
+    """Connects one flight to its ground stations, once per frame."""
+
+    def __init__(self, link: MavlinkLink, simulation: Simulation, *, control: FlightControl, waits: bool) -> None:
+        """Prepare.
+
+        Args:
+            link: The MAVLink process.
+            simulation: What flies, at its start.
+            control: The hand on the flight, for reset and pause.
+            waits: Whether the first sticks that arrive take the controls over.
+        """
+        self._link, self._control = link, control
+        self._settings = StickSettings()
+        for name, value in link.config.parameters.items():
+            self._settings = self._settings.with_parameter(name, value)
+        self._schedule = transition_schedule(load_corridor(simulation.setup.corridor))
+        self._waits = waits
+        self._deferred: list[Request] = []
+        self._frames = 0
+        self._waiting = waits
+        self._begin(simulation)
+        control.poll = self.idle
+
+    def before(self, flight: HandedFlight) -> Command | None:
+        """Serve requests and give the command of the coming frame.
+
+        Args:
+            flight: The flight; its pilot and aids may be switched.
+
+        Returns:
+            The hands' command where they fly, else None.
+        """
+        requests = self._link.input.requests()
+        if requests or self._deferred:
+            pending, self._deferred = [*self._deferred, *requests], []
+            for request in pending:
+                self._serve(request, flight)
+        sticks, age = self._link.input.read(), self._link.input.age()
+        fresh = sticks.sequence > 0 and age <= self._settings.loss_time
+        simulation = flight.simulation
+        if self._waiting and fresh and sticks.stick_valid and sticks.lever_valid:
+            self._waiting = False
+            if simulation.mode != "external":
+                flight.switch_pilot("external")
+        command = None
+        if simulation.mode == "external":
+            situation = StickSituation(self._airspeed, self._angle, self._trim_stick(simulation))
+            command = self._handler.step(sticks, age=age, situation=situation, dt=simulation.dt)
+            state = self._handler.state
+        else:
+            state = INPUT_LIVE if fresh else INPUT_NONE
+        handler = self._handler
+        self._link.report(
+            Feedback(
+                handler.stick,
+                handler.lever,
+                sticks.lateral if fresh else 0.0,
+                sticks.yaw if fresh else 0.0,
+                float(handler.nacelle_switch),
+                self._angle,
+                float(state),
+                self._link.input.first_use_age,
+                self._aid_bits(simulation.aids),
+                float(handler.transition),
+            )
+        )
+        return command
+
+    def after(self, row: FloatArray, dt: float) -> None:
+        """Look at the frame that was flown.
+
+        Args:
+            row: Its row.
+            dt: Length of a frame [s].
+        """
+        # The command angle of the actuator at the start of the coming frame.
+        self._angle = deg(row[COLUMN.nacelle_reference_deg] + row[COLUMN.nacelle_command_rate_deg_s] * dt)
+        self._airspeed = row[COLUMN.airspeed_kt] * KNOT
+        self._acting = (row[COLUMN.stick], row[COLUMN.lever])
+        self._frames += 1
+        if self._frames % _WATCH_FRAMES == 0:
+            self._link.watch()
+
+    def idle(self) -> None:
+        """Hear requests while the flight stands still; called by the executive."""
+        for request in self._link.input.requests():
+            if request.kind == "freeze":
+                self._control.toggle_pause()
+            elif request.kind == "reset":
+                self._control.reset()
+            else:
+                self._deferred.append(request)
+        self._link.watch()
+
+    def engage(self) -> None:
+        """The hands take over in the coming frame."""
+        self._waiting = False
+        self._handler.engage(Command(float(self._acting[0]), float(self._acting[1]), 0.0))
+
+    def reset(self, simulation: Simulation) -> None:
+        """The flight starts again; the hands wait for sticks as at the first start.
+
+        Args:
+            simulation: What flies, at its start.
+        """
+        self._begin(simulation)
+
+    def summary(self) -> dict[str, Any]:
+        """What passed, as the ``mavlink`` entry of ``rtsim fly --json``."""
+        ages = self._link.input.ages()
+        age_ms = None if ages is None else {"p50": ages.p50_ms, "p99": ages.p99_ms, "max": ages.max_ms}
+        return {"port": self._link.port, "input_age_ms": age_ms, **self._link.counters()}
+
+    def _begin(self, simulation: Simulation) -> None:
+        command = simulation.pilot_command()
+        self._acting = (command.stick, command.lever)
+        self._handler = StickHandler(self._settings, start=Command(0.0, command.lever, 0.0), schedule=self._schedule)
+        sensors = simulation.sensors()
+        self._angle, self._airspeed = sensors.nacelle_angle, sensors.airspeed
+        self._waiting = self._waits
+        self._known_aids: tuple[AidName, ...] | None = None
+        self._bits = 0.0
+
+    def _serve(self, request: Request, flight: HandedFlight) -> None:
+        kind = request.kind
+        if kind == "freeze":
+            self._control.toggle_pause()
+        elif kind == "reset":
+            self._control.reset()
+        elif kind == "pilot":
+            self._waiting = False
+            if request.name != flight.simulation.mode:
+                flight.switch_pilot(request.name)
+        elif kind == "aid" and request.name in AIDS:
+            name: AidName = request.name
+            on = name not in flight.simulation.aids if request.value == 2.0 else request.value == 1.0
+            if on != (name in flight.simulation.aids):
+                flight.switch_aid(name, on=on)
+        elif kind == "parameter":
+            self._settings = self._settings.with_parameter(request.name, request.value)
+            self._handler.change(self._settings)
+            flight.tell("parameter", f"{request.name} = {request.value:g}")
+        elif kind in {"nacelle", "transition"}:
+            if flight.simulation.mode != "external":
+                flight.switch_pilot("external")
+            if kind == "nacelle":
+                self._handler.go_to(request.value)
+            else:
+                self._handler.start_transition(int(request.value))
+
+    def _trim_stick(self, simulation: Simulation) -> float:
+        """Stick that trims with the hands off: none where the bias schedule supplies it."""
+        if "trim_bias" in simulation.aids:
+            return 0.0
+        return float(scheduled(simulation.tables.aids, MAP_STICK, self._airspeed, self._angle))
+
+    def _aid_bits(self, aids: tuple[AidName, ...]) -> float:
+        if aids != self._known_aids:
+            self._known_aids = aids
+            self._bits = float(sum(1 << place for place, name in enumerate(AIDS) if name in aids))
+        return self._bits
+
+
+def flown_by_hand(pilot: str) -> bool:
+    """Whether a scenario's pilot is a person behind MAVLink.
+
+    Args:
+        pilot: Name of the pilot.
+    """
+    return pilot == HAND_PILOT
+
+
+def pilot_modes(*, plug_in: bool, hands: bool) -> Sequence[PilotMode]:
+    """Who can fly a flight.
+
+    Args:
+        plug_in: It has a pilot plug-in.
+        hands: Somebody may hold the sticks.
+    """
+    everybody: tuple[PilotMode, ...] = get_args(PilotMode)
+    return everybody if plug_in or hands else tuple(mode for mode in everybody if mode != "external")
+
+
+def refuse_unpaced(scenario: Scenario, *, paced: bool) -> None:
+    """Refuse MAVLink in a flight that is flown as fast as it goes: nobody could follow it.
+
+    Args:
+        scenario: What is flown.
+        paced: Whether the flight is paced.
+
+    Raises:
+        InputError: It is not.
+    """
+    if not paced:
+        raise InputError(
+            "MAVLink needs a paced flight",
+            key="--speed",
+            value="max",
+            allowed="multiples of real time",
+            mend="leave --speed out" if flown_by_hand(scenario.pilot) else "leave --mavlink out",
+        )

@@ -1,0 +1,303 @@
+"""Stick maps: TOML files that say which axis and button does what, checked key by key.
+
+There are two kinds. A *vehicle* map says which axes of MANUAL_CONTROL move the aircraft and how they are shaped
+(``rtsim fly --stick-map``); a *gamepad* map says which axes and buttons of a device become MANUAL_CONTROL
+(``rtsim joystick --map``).
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rtsim.errors import InputError
+
+_MOST_BYTES = 200_000
+_Part = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+_DeadBand = Annotated[float, Field(ge=0.0, le=0.3, allow_inf_nan=False)]
+_ManualAxis = Annotated[str, Field(pattern=r"^(-?(x|y|z|r|s|t|aux[1-6]))?$")]
+_Button = Annotated[int, Field(ge=0, le=31)]
+_DeviceButton = Annotated[int, Field(ge=0, le=255)]
+Function = Literal[
+    "nacelle_aft",
+    "nacelle_forward",
+    "rate_damping",
+    "freeze",
+    "attitude_retention",
+    "pilot",
+    "trim_forward",
+    "trim_aft",
+]
+"""What a button of the vehicle can do."""
+DeviceFunction = Literal[Function, "arm", "reset", "lever_up", "lever_down"]
+"""What a button of a gamepad can do."""
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Shape(_Strict):
+    """``[shape]`` of a vehicle map: the longitudinal stick."""
+
+    dead_band: _DeadBand = 0.0
+    """Part of half travel around the centre that counts as the centre."""
+    expo: _Part = 0.0
+    """0 straight, 1 cubic."""
+    scale: Annotated[float, Field(ge=0.1, le=1.0, allow_inf_nan=False)] = 1.0
+    """Stick at full deflection, part of half travel."""
+
+
+class NacelleSwitchTable(_Strict):
+    """``[nacelle]`` of a vehicle map."""
+
+    detents: bool = False
+    """Runs to detents (the paper's switch) instead of moving while held."""
+    rate_deg_s: Annotated[float, Field(ge=0.5, le=7.5, allow_inf_nan=False)] = 7.5
+    """Rate of switch and commands [deg/s]."""
+
+
+class VehicleMap(_Strict):
+    """A vehicle map."""
+
+    format: Literal[1] = 1
+    """Version of the layout."""
+    kind: Literal["vehicle"] = "vehicle"
+    """Which kind of map this is."""
+    axes: dict[Literal["stick", "lateral", "lever", "yaw", "nacelle"], _ManualAxis] = {}
+    """MANUAL_CONTROL axis behind each control; a leading ``-`` reverses, an empty text takes it away."""
+    shape: Shape = Shape()
+    """Shaping of the longitudinal stick."""
+    nacelle: NacelleSwitchTable = NacelleSwitchTable()
+    """The nacelle switch."""
+    buttons: dict[Function, _Button] = {}
+    """Bit of MANUAL_CONTROL behind each function."""
+
+
+class DeviceAxis(_Strict):
+    """One axis of a gamepad."""
+
+    index: Annotated[int, Field(ge=0, le=63)]
+    """Number of the axis at the device."""
+    reverse: bool = False
+    """Whether its direction is turned round."""
+    dead_band: _DeadBand = 0.05
+    """Part of half travel around the centre that counts as the centre."""
+    expo: _Part = 0.0
+    """0 straight, 1 cubic."""
+
+
+class LeverAxis(DeviceAxis):
+    """The axis behind the power lever."""
+
+    mode: Literal["absolute", "rate"] = "rate"
+    """``absolute``: the axis is the lever; ``rate``: it moves the lever, for sticks that spring back."""
+    rate_per_s: Annotated[float, Field(ge=0.02, le=5.0, allow_inf_nan=False)] = 0.3
+    """Lever travel per second at full deflection, mode ``rate``."""
+
+
+class DeviceAxes(_Strict):
+    """``[axes]`` of a gamepad map."""
+
+    stick: DeviceAxis
+    """Longitudinal stick, forward positive after ``reverse``."""
+    lateral: DeviceAxis | None = None
+    """Lateral stick, right positive."""
+    yaw: DeviceAxis | None = None
+    """Pedals, right positive."""
+    lever: LeverAxis | None = None
+    """Power lever, up positive."""
+
+
+class GamepadMap(_Strict):
+    """A gamepad map."""
+
+    format: Literal[1] = 1
+    """Version of the layout."""
+    kind: Literal["gamepad"]
+    """Which kind of map this is."""
+    name: Annotated[str, Field(min_length=1, max_length=100)]
+    """The device, for people."""
+    match: list[Annotated[str, Field(min_length=2, max_length=100)]] = []
+    """Parts of the names under which the device shows up; capitals do not matter."""
+    axes: DeviceAxes
+    """Its axes."""
+    buttons: dict[DeviceFunction, _DeviceButton] = {}
+    """Button number at the device behind each function."""
+    hat_buttons: dict[Literal["up", "down", "left", "right"], DeviceFunction] = {}
+    """What the directions of the first hat (the cross) do."""
+
+
+StickMap = VehicleMap | GamepadMap
+"""Either kind of map."""
+
+
+def map_names() -> list[str]:
+    """Names of the maps that come with rtsim, sorted."""
+    return sorted(entry.name.removesuffix(".toml") for entry in _library() if entry.name.endswith(".toml"))
+
+
+def load_stick_map(name_or_path: str | Path) -> StickMap:
+    """Load a map.
+
+    Args:
+        name_or_path: A library name, or a path; a word with a ``/`` or ending in ``.toml`` is a path.
+
+    Raises:
+        InputError: It does not exist or is wrong; the first mistake is told.
+    """
+    text, file = _read(name_or_path)
+    found = parse_stick_map(text, file=file)
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def load_vehicle_map(name_or_path: str | Path | None) -> VehicleMap:
+    """Load a vehicle map.
+
+    Args:
+        name_or_path: As for ``load_stick_map``; None is the standard map.
+
+    Raises:
+        InputError: It does not exist, is wrong, or is for a gamepad.
+    """
+    if name_or_path is None:
+        return VehicleMap()
+    found = load_stick_map(name_or_path)
+    if not isinstance(found, VehicleMap):
+        raise _wrong_kind(name_or_path, "vehicle", "rtsim joystick --map")
+    return found
+
+
+def load_gamepad_map(name_or_path: str | Path) -> GamepadMap:
+    """Load a gamepad map.
+
+    Args:
+        name_or_path: As for ``load_stick_map``.
+
+    Raises:
+        InputError: It does not exist, is wrong, or is for the vehicle.
+    """
+    found = load_stick_map(name_or_path)
+    if not isinstance(found, GamepadMap):
+        raise _wrong_kind(name_or_path, "gamepad", "rtsim fly --stick-map")
+    return found
+
+
+def gamepad_map_for(device: str) -> tuple[str, GamepadMap] | None:
+    """The shipped map of a device.
+
+    Args:
+        device: The name under which it shows up.
+
+    Returns:
+        Name and map; None where no map matches.
+    """
+    for name in map_names():
+        found = load_stick_map(name)
+        if isinstance(found, GamepadMap) and any(part.lower() in device.lower() for part in found.match):
+            return name, found
+    return None
+
+
+def parse_stick_map(text: str, *, file: str) -> StickMap | InputError:
+    """Check the text of a map.
+
+    Args:
+        text: The TOML text.
+        file: Where it came from, for the message.
+
+    Returns:
+        The map, or its first mistake.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return InputError(f"is not valid TOML: {error}", file=file, mend="correct this line")
+    kind = data.get("kind")
+    models: dict[Any, type[StickMap]] = {"vehicle": VehicleMap, "gamepad": GamepadMap}
+    if not isinstance(kind, str) or kind not in models:
+        return InputError(
+            "is no kind of stick map", file=file, key="kind", value=kind, allowed="vehicle, gamepad", mend="choose one"
+        )
+    try:
+        return models[kind].model_validate(data)
+    except ValidationError as error:
+        return _explain(error, models[kind], file)
+
+
+def _explain(error: ValidationError, model: type[BaseModel], file: str) -> InputError:
+    """The first finding as a sentence."""
+    item = error.errors()[0]
+    place = [part for part in item["loc"] if part != "[key]"]
+    key = ".".join(str(part) for part in place)
+    kind = item["type"]
+    if kind == "missing":
+        return InputError("is missing", file=file, key=key, mend="add it")
+    if kind == "extra_forbidden":
+        known = list(_known_keys(model, place[:-1]))
+        similar = difflib.get_close_matches(str(place[-1]), known, n=1)
+        mend = f"perhaps '{similar[0]}' is meant" if similar else "delete it"
+        return InputError("is not a known key", file=file, key=key, allowed=", ".join(known), mend=mend)
+    context = item.get("ctx", {})
+    allowed = context.get("expected")
+    if "ge" in context:
+        allowed = f"at least {context['ge']:g}"
+    elif "le" in context:
+        allowed = f"at most {context['le']:g}"
+    message = item["msg"][:1].lower() + item["msg"][1:].rstrip(".")
+    return InputError(message, file=file, key=key, value=item.get("input"), allowed=allowed, mend="correct the value")
+
+
+def _known_keys(model: type[BaseModel], place: list[Any]) -> Iterator[str]:
+    """Keys of the table a place leads to."""
+    here: Any = model
+    for part in place:
+        field = here.model_fields.get(part) if isinstance(here, type) and issubclass(here, BaseModel) else None
+        if field is None:
+            return
+        candidates = [field.annotation, *getattr(field.annotation, "__args__", ())]
+        here = next((each for each in candidates if isinstance(each, type) and issubclass(each, BaseModel)), None)
+    if isinstance(here, type) and issubclass(here, BaseModel):
+        yield from sorted(here.model_fields)
+
+
+def _wrong_kind(name: object, wanted: str, command: str) -> InputError:
+    return InputError(
+        f"is not a {wanted} map", key="kind", file=str(name), allowed=wanted, mend=f"it is meant for {command}"
+    )
+
+
+def _library() -> Any:
+    return (resources.files("telemetry.joystick") / "maps").iterdir()
+
+
+def _read(name_or_path: str | Path) -> tuple[str, str]:
+    """The text of a map, and how to call its file."""
+    text = str(name_or_path)
+    names = map_names()
+    if isinstance(name_or_path, str) and "/" not in text and not text.endswith(".toml"):
+        if text not in names:
+            raise InputError(
+                "is not a stick map of the library",
+                key="--map",
+                value=text,
+                allowed=", ".join(names),
+                mend="choose one, or give a path ending in .toml",
+            )
+        return (resources.files("telemetry.joystick") / "maps" / f"{text}.toml").read_text(encoding="utf-8"), text
+    try:
+        path = Path(name_or_path)
+        if path.stat().st_size > _MOST_BYTES:
+            raise InputError("is too large for a stick map", file=text)
+        return path.read_text(encoding="utf-8"), text
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text file"
+        raise InputError(f"cannot be read: {reason}", file=text, mend="check the path") from None
