@@ -39,3 +39,14 @@ def inner_kernel(function: Function) -> Function:
     njit: Any = numba.njit  # the option is not in its type hints
     compiled: Function = njit(cache=True, error_model="numpy", _nrt=False)(function)
     return compiled
+
+
+def batch_kernel(function: Function) -> Function:
+    """Compile a kernel that flies or measures whole flights outside Python's lock, so that threads fly side by side.
+
+    Args:
+        function: A function of numbers, arrays and named tuples of them; its work space must be its thread's own.
+    """
+    njit: Any = numba.njit
+    compiled: Function = njit(cache=True, error_model="numpy", nogil=True)(function)
+    return compiled

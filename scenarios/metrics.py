@@ -6,6 +6,7 @@ how the flight was made: the nacelle reference, for one, is solved afresh from t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import get_type_hints
 
@@ -258,8 +259,8 @@ def flight_metrics(rows: FloatArray, programme: Programme, dt: float) -> FlightM
         ),
         altitude_m=AltitudeMetrics(max_deviation=float(np.abs(altitude_error).max()), final=float(altitude[-1])),
         pitch_deg=PitchMetrics(min=float(pitch.min()), max=float(pitch.max())),
-        stick=StickMetrics(float(stick_in.std()), _rate_deviation(stick_in, running, dt), float(np.ptp(stick_in))),
-        lever=LeverMetrics(float(lever.std()), _rate_deviation(lever, running, dt), float(np.ptp(lever))),
+        stick=StickMetrics(_deviation(stick_in), _rate_deviation(stick_in, running, dt), float(np.ptp(stick_in))),
+        lever=LeverMetrics(_deviation(lever), _rate_deviation(lever, running, dt), float(np.ptp(lever))),
         controls_on_stop_frames=int(np.count_nonzero(column(COLUMN.control_on_stop) > 0.5)),
     )
 
@@ -272,15 +273,31 @@ def _flapping(flapping: FloatArray, time: FloatArray, dt: float) -> FlappingMetr
         peak_time_s=float(time[peak]),
         peak_after_30_s=float(late.max()) if late.size else None,
         rms=_rms(flapping),
-        integral_deg_s=float(flapping.sum() * dt),
+        integral_deg_s=_sum(flapping) * dt,
     )
 
 
+def _sum(values: FloatArray) -> float:
+    """Sum in the order of the frames, so that a flight measured while it is flown gives the same to the last bit."""
+    return float(np.cumsum(values)[-1]) if values.size else 0.0
+
+
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values * values)))
+    return math.sqrt(_sum(values * values) / values.size)
+
+
+def _deviation(values: FloatArray) -> float:
+    """Standard deviation about the mean, summed about the first value."""
+    return _deviation_about_zero(values - values[0])
 
 
 def _rate_deviation(values: FloatArray, running: npt.NDArray[np.bool_], dt: float) -> float:
     """Standard deviation of the rate over the frames that follow one another."""
-    rates = np.diff(values)[running] / dt
-    return float(rates.std()) if rates.size else 0.0
+    return _deviation_about_zero(np.diff(values)[running] / dt)
+
+
+def _deviation_about_zero(values: FloatArray) -> float:
+    if not values.size:
+        return 0.0
+    mean = _sum(values) / values.size
+    return math.sqrt(max(_sum(values * values) / values.size - mean * mean, 0.0))

@@ -7,6 +7,7 @@ Each has its name, its source and the acceleration cap at which the nonlinear mo
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 from functools import cache
 
@@ -138,7 +139,7 @@ def centre_line_variable(
     """
     corners = centre_line_corners()
     points = [PathPoint(*corners[0])]
-    for before, corner in zip(corners, corners[1:], strict=False):
+    for before, corner in itertools.pairwise(corners):
         change, tilt = corner[0] - before[0], before[1] - corner[1]
         cap = airplane_kt_s if max(before[1], corner[1]) <= 0.0 else acceleration_kt_s
         if change < 1e-9 and tilt < 1e-9:

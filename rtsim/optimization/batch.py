@@ -1,0 +1,112 @@
+"""Many flights at once: one candidate per flight, measured while it is flown, over all cores.
+
+The threads share the aircraft's tables and own everything else. A flight depends on its programme and seed alone, so
+the figures do not depend on how many workers there are or on who flies what.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtsim.atmosphere import normals_needed
+from rtsim.frame import SIGNAL_COUNT
+from rtsim.optimization import merit_kernels as kernels
+from rtsim.optimization.figures import FlightFigures, figures_from_sums
+from rtsim.programme import Programme
+from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
+from rtsim.simulation_kernels import CLOCK_END, END_NONE, Scratch
+from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
+
+CHUNK_FRAMES = 2_048
+"""Frames for which noise is drawn at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class BatchFlight:
+    """One flight of a batch."""
+
+    programme: Programme
+    """What it is asked to do; it begins at the batch's start condition."""
+    seed: int | None = None
+    """Root of its random streams; None takes the batch's."""
+    duration: float | None = None
+    """Length [s]; None takes the programme's."""
+
+
+class BatchFlyer:
+    """Flies programmes that share everything but the programme and the seed."""
+
+    def __init__(self, setup: FlightSetup, *, workers: int | None = None) -> None:
+        """Load the aircraft once for all flights.
+
+        Args:
+            setup: What flies and how; its programme gives the start condition of every flight.
+            workers: Threads; None takes one for every core.
+
+        Raises:
+            InputError: The start has no trim.
+        """
+        self.setup = setup
+        self.workers = max(1, workers if workers is not None else os.cpu_count() or 1)
+        self._parts = build_parts(setup)
+
+    @property
+    def database_hash(self) -> str:
+        """Content hash of the LPV database in use."""
+        return self._parts.database_hash
+
+    def fly(self, flights: Sequence[BatchFlight | Programme]) -> list[FlightFigures]:
+        """Fly them all.
+
+        Args:
+            flights: The flights; a programme alone is flown with the batch's seed.
+
+        Returns:
+            Their figures, in the same order.
+        """
+        jobs = [flight if isinstance(flight, BatchFlight) else BatchFlight(flight) for flight in flights]
+        if self.workers == 1 or len(jobs) < 2:
+            return [self.fly_one(job) for job in jobs]
+        from joblib import Parallel, delayed
+
+        parallel = Parallel(n_jobs=min(self.workers, len(jobs)), backend="threading", batch_size=1)
+        return list(parallel(delayed(self.fly_one)(job) for job in jobs))
+
+    def fly_one(self, flight: BatchFlight) -> FlightFigures:
+        """Fly one in this thread.
+
+        Args:
+            flight: The flight.
+        """
+        seed = self.setup.seed if flight.seed is None else flight.seed
+        setup = dataclasses.replace(self.setup, programme=flight.programme, seed=seed)
+        parts = self._own_parts(flight.programme)
+        pilot_random = stream_generator(seed, STREAM_PILOT)
+        air_random = stream_generator(seed, STREAM_TURBULENCE)
+        state = start_state(setup, parts, air_random.standard_normal(3))
+        dt = parts.tables.dt
+        duration = flight.programme.duration if flight.duration is None else flight.duration
+        frames = max(1, math.ceil(duration * self.setup.rate_hz - 1e-6))
+        row, merit = np.zeros(SIGNAL_COUNT), np.zeros(kernels.MERIT_SIZE)
+        flown = 0
+        while flown < frames and state.clock[CLOCK_END] == END_NONE:
+            count = min(CHUNK_FRAMES, frames - flown)
+            noise = pilot_random.standard_normal((count, parts.noise_width))
+            air_noise = air_random.standard_normal((count, normals_needed(state.gusts)))
+            flown += kernels.fly_measured(parts.tables, state, parts.scratch, noise, air_noise, row, merit)
+        return figures_from_sums(merit, dt)
+
+    def _own_parts(self, programme: Programme) -> Parts:
+        """The shared parts with this flight's programme and its own work space."""
+        points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
+        return dataclasses.replace(
+            self._parts,
+            tables=self._parts.tables._replace(programme=points),
+            scratch=Scratch(*(np.zeros_like(array) for array in self._parts.scratch)),
+        )
