@@ -29,10 +29,11 @@ def edges(axis: np.ndarray) -> np.ndarray:
 
 
 def frame(axes, title: str) -> None:
+    """Draw the design corridor and the points of Table 1."""
     corridor = load_corridor("design")
     angle = np.linspace(0.0, deg(90.0), 181)
     axes.plot(to_kt(np.asarray(corridor.low_speed(angle))), to_deg(angle), color="k", linewidth=1.0)
-    axes.plot(to_kt(np.minimum(np.asarray(corridor.high_speed(angle)), kt(260.0))), to_deg(angle), color="k", linewidth=1.0)
+    axes.plot(to_kt(np.asarray(corridor.high_speed(angle))), to_deg(angle), color="k", linewidth=1.0)
     axes.plot(TABLE_1[:, 0], TABLE_1[:, 1], "k--", linewidth=0.8)
     axes.set(title=title, xlim=(-25.0, 265.0), ylim=(-3.0, 93.0))
     axes.tick_params(labelsize=8)
@@ -40,6 +41,7 @@ def frame(axes, title: str) -> None:
 
 
 def draw_stability(database: Database) -> None:
+    """Growth rates of both forms on the level and the outermost layers."""
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     FigureCanvasAgg(figure)
     grid = figure.subplots(2, 3, sharex=True, sharey=True)
@@ -72,6 +74,7 @@ def draw_stability(database: Database) -> None:
 
 
 def report(title: str, result: StabilityMap) -> None:
+    """Print the numbers of a map."""
     places = [f"{to_kt(v):.0f}/{to_deg(n):.1f}: {g:+.3f}" for v, n, g in result.unstable]
     sys.stdout.write(
         f"{title}: {np.isfinite(result.growth).sum()} points, max {np.nanmax(result.growth):+.4f}, "
@@ -80,6 +83,7 @@ def report(title: str, result: StabilityMap) -> None:
 
 
 def draw_margins(database: Database) -> None:
+    """Margins of both hands on the level layer, and along Table 1."""
     lpv, pilot = prepare_tables(database), load_pilot_tables(database)
     valid = database.valid[database.level_layer]
     values = np.full((6, *valid.shape), np.nan)
@@ -95,11 +99,12 @@ def draw_margins(database: Database) -> None:
     ranges = ((0.0, 4.0), (0.0, 90.0), (0.0, 15.0)) * 2
     for axes, name, value, (low, high) in zip(grid.flat, names, values, ranges, strict=True):
         mesh = axes.pcolormesh(
-            to_kt(edges(database.airspeed)), to_deg(edges(database.nacelle)), value.T, vmin=low, vmax=high, cmap="viridis"
+            to_kt(edges(database.airspeed)), to_deg(edges(database.nacelle)), value.T, vmin=low, vmax=high
         )
         figure.colorbar(mesh, ax=axes)
         frame(axes, name)
-        sys.stdout.write(f"{name}: {np.nanmin(value):.2f} to {np.nanmax(value):.2f}, median {np.nanmedian(value):.2f}\n")
+        low, middle, high = np.nanquantile(value, (0.0, 0.5, 1.0))
+        sys.stdout.write(f"{name}: {low:.2f} to {high:.2f}, median {middle:.2f}\n")
     figure.supxlabel("airspeed [kn]")
     figure.supylabel("nacelle angle [deg]")
     figure.savefig(HERE / "pilot_margins.png", dpi=110)
@@ -112,6 +117,7 @@ def draw_margins(database: Database) -> None:
 
 
 def main() -> None:
+    """Draw both figures."""
     database = load_database()
     draw_stability(database)
     draw_margins(database)

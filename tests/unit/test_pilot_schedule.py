@@ -30,7 +30,7 @@ def place(airspeed_kt: float, nacelle_deg: float) -> tuple[int, int, int]:
     return LEVEL, i, j
 
 
-def part(rows: slice, columns: slice, *, whole_pilot: bool = True) -> Database:
+def part(rows: slice, columns: slice) -> Database:
     """A corner of the database with all its layers, without gains."""
     arrays = {name: getattr(DATABASE, name)[:, rows, columns] for name in GRIDDED}
     return replace(
@@ -55,7 +55,7 @@ def test_layout_sorts_the_states() -> None:
 
 @pytest.mark.parametrize(("airspeed_kt", "nacelle_deg"), POINTS)
 def test_design_plant_agrees_with_the_whole_model(airspeed_kt: float, nacelle_deg: float) -> None:
-    """Controls and gusts to u, w, q, pitch against the full 17 states: exact in the static limit, flight modes within 5 %."""
+    """Against the full 17 states: exact in the static limit, flight modes within 5 %."""
     where = place(airspeed_kt, nacelle_deg)
     layout = plant_layout(DATABASE, integrators=False)
     plant = design_plant(DATABASE, layout, where=where, settings=SETTINGS)
