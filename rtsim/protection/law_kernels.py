@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 from rtsim.protection import prediction_kernels as model
+from rtsim.protection.law_data import *  # noqa: F403  # one place to take a law's kernels and its constants from
 from rtsim.protection.law_data import (
     CHANGE_LEVER,
     CHANGE_RATE,
@@ -64,11 +64,13 @@ from rtsim.protection.law_data import (
     SENSE_TORQUE,
     ProtectionTables,
 )
+from rtsim.protection.limiter_kernels import allowed_sink as allowed_sink  # noqa: PLC0414
 from rtsim.protection.limiter_kernels import blend_recovery, clip, govern, limit_lever, limit_stick
+from rtsim.protection.limiter_kernels import torque_limit as torque_limit  # noqa: PLC0414
 from rtsim.protection.prediction_kernels import accelerations, model_at, roll_out
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def law_release(state: FloatArray) -> None:
     """Let every command pass.
 
@@ -81,7 +83,7 @@ def law_release(state: FloatArray) -> None:
     state[L_RATE_LOW], state[L_RATE_HIGH] = -FREE, FREE
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def law_start(tables: ProtectionTables, state: FloatArray) -> None:
     """Set the state to that before the first decision.
 
@@ -95,7 +97,7 @@ def law_start(tables: ProtectionTables, state: FloatArray) -> None:
     law_release(state)
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def law_release_unblended(state: FloatArray) -> None:
     """Take the bounds away and leave the blend to its own decay.
 
@@ -107,7 +109,7 @@ def law_release_unblended(state: FloatArray) -> None:
     state[L_BLEND] = blend
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def _finite(values: FloatArray) -> bool:
     finite = True
     for i in range(values.shape[0]):
@@ -115,7 +117,7 @@ def _finite(values: FloatArray) -> bool:
     return finite
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def law_decide(
     tables: ProtectionTables, state: FloatArray, sensors: FloatArray, command: FloatArray, work: FloatArray
 ) -> None:
@@ -183,7 +185,7 @@ def law_decide(
     state[L_STARTED] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def law_apply(tables: ProtectionTables, state: FloatArray, command: FloatArray, applied: FloatArray) -> None:
     """Limit this frame's command by what was decided last.
 
@@ -215,7 +217,7 @@ def law_apply(tables: ProtectionTables, state: FloatArray, command: FloatArray, 
     state[L_ACTED_RATE] = applied[2]
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def _apply_hands(state: FloatArray, stick: float, lever: float, applied: FloatArray) -> None:
     blend = state[L_BLEND]
     if blend > 0.0:
@@ -237,7 +239,7 @@ def _apply_hands(state: FloatArray, stick: float, lever: float, applied: FloatAr
         state[L_LEVER_CAUSE] = state[L_LEVER_REASON]
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def protect(
     tables: ProtectionTables,
     state: FloatArray,

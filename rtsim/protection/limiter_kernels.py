@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import (
@@ -51,7 +50,7 @@ from rtsim.protection.law_data import (
 from rtsim.protection.prediction_kernels import accelerations, affine, model_at, roll_out, speed_range
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def torque_limit(tables: TorqueTables, airspeed: float, nacelle: float) -> float:
     """Mast-torque limit at a condition [N m].
 
@@ -65,7 +64,7 @@ def torque_limit(tables: TorqueTables, airspeed: float, nacelle: float) -> float
     return tables.cruise
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def allowed_sink(tables: SinkTables, airspeed: float, altitude: float) -> float:
     """Sink rate a pilot may fly [m/s].
 
@@ -78,7 +77,7 @@ def allowed_sink(tables: SinkTables, airspeed: float, altitude: float) -> float:
     return max(tables.floor, tables.slope * abs(airspeed)) + above
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def clip(value: float, low: float, high: float) -> float:
     """Limit a value; the upper bound wins where bounds cross.
 
@@ -90,7 +89,7 @@ def clip(value: float, low: float, high: float) -> float:
     return min(max(value, low), high)
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def govern(
     tables: ProtectionTables,
     state: FloatArray,
@@ -180,7 +179,7 @@ def govern(
     state[L_RATE_REASON] = REASON_LOW if low_side else (REASON_GATE if gated else REASON_HIGH)
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def _recover(
     tables: ProtectionTables,
     state: FloatArray,
@@ -221,7 +220,7 @@ def _recover(
     state[L_LEVER] = clip(lever, 0.0, 1.0)
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def blend_recovery(
     tables: ProtectionTables,
     state: FloatArray,
@@ -275,7 +274,7 @@ def blend_recovery(
         _recover(tables, state, cell, target, z, flight)
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def limit_stick(
     tables: ProtectionTables,
     state: FloatArray,
@@ -331,7 +330,7 @@ def limit_stick(
     state[L_STICK_LOW_REASON], state[L_STICK_HIGH_REASON] = low_reason, high_reason
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def limit_lever(
     tables: ProtectionTables, state: FloatArray, cell: FloatArray, torque: float, airspeed: float, angle: float
 ) -> None:

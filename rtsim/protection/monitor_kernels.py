@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from rtsim.compiled import inner_kernel, kernel
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.frame import FloatArray
 from rtsim.protection.law_data import (
@@ -81,7 +81,7 @@ class MonitorTables(NamedTuple):
     """How long it must be above threshold plus hysteresis [s]."""
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: float, out: FloatArray) -> None:
     """Signed distance to every limit, positive inside.
 
@@ -110,7 +110,7 @@ def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: flo
     out[KIND_TIME] = time_to_limit
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def levels_step(tables: MonitorTables, margins: FloatArray, dt: float, state: FloatArray, levels: FloatArray) -> None:
     """Advance the warning level of every limit by one frame.
 
@@ -143,7 +143,7 @@ def levels_step(tables: MonitorTables, margins: FloatArray, dt: float, state: Fl
         levels[kind] = level
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def _segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
     dx, dy = x1 - x0, y1 - y0
     square = dx * dx + dy * dy
@@ -151,7 +151,7 @@ def _segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: f
     return math.hypot(x - x0 - t * dx, y - y0 - t * dy)
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) -> float:
     """Signed distance to the nearer boundary in the plane of airspeed / 10 kn and nacelle angle / 10 deg.
 
@@ -181,7 +181,7 @@ def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) ->
     return best if low <= airspeed <= high else -best
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def watch(
     tables: MonitorTables,
     sensors: FloatArray,
@@ -209,7 +209,7 @@ def watch(
         distance[k] = normalized_distance(tables, sensors[k, SENSE_AIRSPEED], sensors[k, SENSE_NACELLE])
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def predict(
     tables: ProtectionTables, sensors: FloatArray, acting: FloatArray, time_to_limit: FloatArray, side: FloatArray
 ) -> None:

@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 from rtsim.units import GRAVITY
 
@@ -78,7 +77,7 @@ class BoundaryTables(NamedTuple):
     """High-speed side on the downstop [m/s]."""
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def speed_range(tables: BoundaryTables, angle: float) -> tuple[float, float]:
     """Lowest and highest allowed airspeed at a nacelle angle [m/s].
 
@@ -95,7 +94,7 @@ def speed_range(tables: BoundaryTables, angle: float) -> tuple[float, float]:
     return low, tables.high[k] + share * (tables.high[k + 1] - tables.high[k])
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def _cell_below(axis: FloatArray, value: float) -> int:
     low = 0
     high = axis.shape[0] - 1
@@ -108,7 +107,7 @@ def _cell_below(axis: FloatArray, value: float) -> int:
     return low
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArray) -> None:
     """Interpolate the model, bilinear; outside the grid the nearest point holds.
 
@@ -136,7 +135,7 @@ def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArr
         out[k] = w00 * c00[k] + w01 * c01[k] + w10 * c10[k] + w11 * c11[k]
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def affine(
     cell: FloatArray, place: int, z: tuple[float, float, float, float], controls: tuple[float, float], rate: float
 ) -> float:
@@ -160,7 +159,7 @@ def affine(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def accelerations(
     cell: FloatArray,
     z: tuple[float, float, float, float],
@@ -203,7 +202,7 @@ def accelerations(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner_kernel
 def roll_out(
     tables: ModelTables,
     corridor: BoundaryTables,
