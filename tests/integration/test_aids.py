@@ -1,0 +1,129 @@
+"""Pilot aids: what they promise about roots, about switching, and in flight."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rtsim.aids import AIDS
+from rtsim.aids.handling import handling
+from rtsim.command import Command
+from rtsim.corridor import load_corridor
+from rtsim.errors import InputError
+from rtsim.frame import COLUMN
+from rtsim.lpv.aircraft import load_aircraft
+from rtsim.programme import Programme
+from rtsim.simulation import FlightSetup, Simulation
+from rtsim.units import deg, kt
+
+CONDITIONS = [(0, 90), (20, 90), (40, 82), (60, 75), (80, 75), (105, 50), (130, 25), (170, 0)]
+STABILITY = ("rate_damping", "attitude_retention", "trim_bias")
+HOLDS = (*STABILITY, "altitude_hold", "airspeed_hold")
+
+
+def setup(airspeed_kt: float, nacelle_deg: float, **changes: object) -> FlightSetup:
+    """A flight in other hands than the MOCM's, from a trim."""
+    programme = Programme.hold(airspeed=kt(airspeed_kt), nacelle_angle=deg(nacelle_deg), altitude=100.0)
+    return FlightSetup(programme=programme, pilot="external", **changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("airspeed", "nacelle"), CONDITIONS)
+def test_aids_make_the_aircraft_easier(airspeed: float, nacelle: float) -> None:
+    """Each layer of aids moves the rightmost root to the left or leaves a root slower than 50 s alone; holds are stable."""
+    aircraft = load_aircraft()
+    bare, damped, retained, held = (
+        handling(aircraft, airspeed=kt(airspeed), nacelle=deg(nacelle), aids=aids).rightmost
+        for aids in ((), ("rate_damping",), STABILITY, HOLDS)
+    )
+    assert damped <= max(bare, 0.02)
+    assert retained < 0.02
+    assert held < 0.0
+
+
+def test_attitude_retention_is_stable_over_the_corridor() -> None:
+    """No root right of +0.03 rad/s at any fifth valid grid point inside the design corridor (a divergence slower than 30 s)."""
+    aircraft, corridor = load_aircraft(), load_corridor("design")
+    database = aircraft.database
+    valid = np.argwhere(database.valid[database.level_layer])
+    inside = [(i, j) for i, j in valid if corridor.inside(database.airspeed[i], database.nacelle[j])]
+    worst = max(
+        handling(aircraft, airspeed=float(database.airspeed[i]), nacelle=float(database.nacelle[j]), aids=STABILITY).rightmost
+        for i, j in inside[::5]
+    )
+    assert worst < 0.03
+
+
+def test_bias_centres_the_stick() -> None:
+    """With the trim bias, hands off is the trim: the acting stick is the trim stick at zero pilot stick (paper, 4.1)."""
+    simulation = Simulation(setup(105, 50, aids=STABILITY))
+    lever = simulation.step(Command(0.0, float(simulation.tables.programme[0, 0]) + 0.5, 0.0))[COLUMN.lever]
+    simulation.reset()
+    rows = [simulation.step(Command(0.0, float(lever), 0.0)) for _ in range(1250)]
+    assert abs(rows[-1][COLUMN.pitch_deg] - rows[0][COLUMN.pitch_deg]) < 0.5
+    assert rows[0][COLUMN.pilot_stick] == 0.0
+    assert rows[0][COLUMN.stick] > 0.2
+
+
+@pytest.mark.parametrize("aid", list(AIDS))
+@pytest.mark.parametrize(("airspeed", "nacelle"), [(0, 90), (80, 75), (130, 25), (170, 0)])
+def test_switching_an_aid_does_not_step_the_controls(aid: str, airspeed: float, nacelle: float) -> None:
+    """On and off in flight: no control moves by more than 1 % of its travel in the frame of the switch (issue 3)."""
+    simulation = Simulation(setup(airspeed, nacelle))
+    stick, lever = (float(v) for v in simulation._state.u[:2])
+    before = simulation.step(Command(stick, lever, 0.0))
+    for _ in range(50):
+        before = simulation.step(Command(stick, lever, 0.0))
+    for on in (True, False):
+        simulation.set_aid(aid, on)  # type: ignore[arg-type]
+        after = simulation.step(Command(stick, lever, 0.0))
+        assert abs(after[COLUMN.stick] - before[COLUMN.stick]) < 0.02
+        assert abs(after[COLUMN.lever] - before[COLUMN.lever]) < 0.01
+        for _ in range(200):
+            before = simulation.step(Command(stick, lever, 0.0))
+
+
+@pytest.mark.parametrize(("airspeed", "nacelle"), [(0, 90), (80, 75), (130, 25), (160, 0)])
+def test_holds_hold(airspeed: float, nacelle: float) -> None:
+    """Hands off for two minutes after a push: height within 3 m and airspeed within 2 kn of the captured values at the end."""
+    simulation = Simulation(setup(airspeed, nacelle))
+    stick, lever = (float(v) for v in simulation._state.u[:2])
+    for name in HOLDS:
+        simulation.set_aid(name, True)  # type: ignore[arg-type]
+    simulation.step(Command(0.0, lever, 0.0))
+    simulation._state.x[2] += 0.05  # a bump in pitch rate
+    for _ in range(120 * 250):
+        row = simulation.step(Command(0.0, lever, 0.0))
+    assert not simulation.finished
+    assert abs(row[COLUMN.altitude_m] - 100.0) < 3.0
+    assert abs(row[COLUMN.airspeed_kt] - airspeed) < 2.0
+    assert stick == stick
+
+
+def test_the_mocm_flies_the_bare_aircraft() -> None:
+    """Aids switched on change nothing while the MOCM flies."""
+    programme = Programme.hold(airspeed=kt(60.0), nacelle_angle=deg(80.0), altitude=100.0)
+    bare = Simulation(FlightSetup(programme=programme)).run(500)
+    aided = Simulation(FlightSetup(programme=programme, aids=HOLDS)).run(500)
+    np.testing.assert_array_equal(bare, aided)
+
+
+def test_hands_off_the_mocm() -> None:
+    """MOCM to hands with other stick and lever positions: the controls do not step, then go over to the hands."""
+    programme = Programme.hold(airspeed=kt(60.0), nacelle_angle=deg(80.0), altitude=100.0)
+    simulation = Simulation(FlightSetup(programme=programme))
+    before = simulation.run(250)[-1]
+    simulation.set_pilot("external")
+    hands = Command(float(before[COLUMN.stick]) + 0.1, float(before[COLUMN.lever]) - 0.05, 0.0)
+    first = simulation.step(hands)
+    assert abs(first[COLUMN.stick] - before[COLUMN.stick]) < 0.02
+    assert abs(first[COLUMN.lever] - before[COLUMN.lever]) < 0.01
+    for _ in range(5 * 250):
+        row = simulation.step(hands)
+    assert row[COLUMN.stick] == pytest.approx(hands.stick, abs=0.01)
+    assert row[COLUMN.lever] == pytest.approx(hands.lever, abs=0.01)
+
+
+def test_an_unknown_aid_is_refused() -> None:
+    """A wrong name gets the choices."""
+    with pytest.raises(InputError, match="rate_damping"):
+        Simulation(setup(0, 90)).set_aid("autopilot", True)  # type: ignore[arg-type]
