@@ -1,6 +1,6 @@
 """What a number of flights says about a rate or a quantile, with its uncertainty.
 
-All bounds are exact for the sampled distribution of flights: they speak of the campaign's misuse, not of flight at large.
+All bounds are exact for the sampled distribution of flights: they speak of a campaign's misuse, not of flight at large.
 """
 
 from __future__ import annotations
@@ -141,12 +141,10 @@ def quantile(
     return Quantile(float(np.quantile(sample, share)), float(low), float(high))
 
 
-def bound_decided(
-    count: int, done: int, planned: int, limit: float, *, confidence: float = CONFIDENCE
-) -> bool | None:
+def bound_decided(count: int, done: int, planned: int, limit: float, *, confidence: float = CONFIDENCE) -> bool | None:
     """Say whether the flights so far already decide if the upper bound after all planned ones is within a limit.
 
-    This is curtailed sampling: the verdict is exactly that of the whole campaign, so stopping early costs no confidence.
+    This is curtailed sampling: the verdict is that of the whole campaign, so stopping early costs no confidence.
 
     Args:
         count: Flights so far in which it happened.

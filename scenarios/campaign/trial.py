@@ -1,0 +1,326 @@
+"""Flies trials: one flight plan, one protection law, one set of random numbers; the same for tests and campaigns."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from rtsim import simulation_kernels as simulation
+from rtsim.aircraft.signals import STATE
+from rtsim.atmosphere import AirSpecification, normals_needed
+from rtsim.errors import InputError
+from rtsim.faults import Fault, fault_tables
+from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.programme import Programme, ProgrammePoint
+from rtsim.protection import law_data, law_kernels
+from rtsim.protection.chain import LawChain, compiled_law
+from rtsim.protection.laws import LawSpec
+from rtsim.protection.limits import load_limits
+from rtsim.protection.tables import law_tables
+from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
+from rtsim.simulation import END_REASONS
+from rtsim.simulation_setup import FlightSetup, Parts, Plant, build_parts, start_state
+from rtsim.units import to_deg, to_kt
+from scenarios import script_kernels
+from scenarios.campaign import trial_kernels as kernels
+from scenarios.script import Pulse, pulse_table
+from scenarios.verdict_metrics import TORQUE_EXCESS, TrialMetrics
+
+if TYPE_CHECKING:
+    from rtsim.command import Pilot
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPlan:
+    """One flight as it is meant to go, without a law. SI and radians."""
+
+    programme: Programme
+    """What the pilot is asked to do."""
+    start: ProgrammePoint
+    """Trimmed condition at frame 0."""
+    duration: float
+    """Length of the flight [s]."""
+    pulses: tuple[Pulse, ...] = ()
+    """What the script does to the controls."""
+    reaction: float | None = None
+    """A pilot who yields: how long a warning lasts before he gives up his plan [s]; None: he never does."""
+    air: AirSpecification = field(default_factory=AirSpecification)
+    """Gusts and turbulence."""
+    faults: tuple[Fault, ...] = ()
+    """Failures."""
+    wind: float = 0.0
+    """Steady tailwind [m/s]."""
+    pilot_noise: bool = False
+    """Noise of the built-in pilot."""
+    outer_loop: Literal["integrators", "pi"] = "integrators"
+    """How the built-in pilot holds airspeed and altitude."""
+    seed: int = 0
+    """Root of the flight's random streams."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrialFlight:
+    """One flown trial."""
+
+    metrics: TrialMetrics
+    """What it is judged by."""
+    end_reason: str
+    """Why it ended by itself, or empty."""
+    rows: FloatArray
+    """Frame history; a view that the next flight of the same bench overwrites unless it was asked to be kept."""
+    actions: FloatArray
+    """What the law changed, frame by frame; the same holds."""
+    law_problems: tuple[str, ...] = ()
+    """What went wrong in laws written in Python, as sentences."""
+
+    @property
+    def history_sha256(self) -> str:
+        """Hash of the frame history."""
+        return history_sha256([self.rows])
+
+
+class Bench:
+    """Flies trials of one plant against one corridor; loads everything once."""
+
+    def __init__(
+        self,
+        *,
+        plant: Plant = "lpv",
+        corridor: Literal["design", "flight"] = "flight",
+        rate_hz: int = 250,
+    ) -> None:
+        """Remember what to fly; parts are loaded with the first flight.
+
+        Args:
+            plant: Aircraft model.
+            corridor: Boundaries that laws keep to and flights are judged by.
+            rate_hz: Frames per second.
+        """
+        self.plant, self.corridor, self.rate_hz = plant, corridor, rate_hz
+        self._parts: dict[tuple[str, bool], Parts] = {}
+        self._laws: dict[tuple[str, float], law_data.ProtectionTables] = {}
+        self._rows = np.zeros((0, SIGNAL_COUNT))
+        self._actions = np.zeros((0, kernels.ACTION_SIZE))
+        limits = load_limits()
+        self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
+        self._work = (
+            np.zeros(law_data.SENSOR_COUNT),
+            np.zeros(law_data.WORK_SIZE),
+            np.zeros(3),
+            np.zeros(3),
+        )
+
+    @property
+    def dt(self) -> float:
+        """Length of a frame [s]."""
+        return 1.0 / self.rate_hz
+
+    def law(self, name: str, *, buffer: float = 0.0) -> law_data.ProtectionTables:
+        """Give the tables of a built-in law.
+
+        Args:
+            name: One of ``rtsim.protection.tables.LAW_NAMES``.
+            buffer: Added to the margins at which governor and recovery begin to act [m/s].
+        """
+        key = (name, buffer)
+        if key not in self._laws:
+            from rtsim.lpv.database import load_database
+
+            tables = law_tables(name, load_database(), dt=self.dt, boundary=self.corridor)
+            settings = tables.settings
+            self._laws[key] = tables._replace(
+                settings=settings._replace(
+                    reverse_margin=settings.reverse_margin + buffer,
+                    pass_margin=settings.pass_margin + buffer,
+                    blend_begin=settings.blend_begin + buffer,
+                    blend_full=settings.blend_full + buffer,
+                )
+            )
+        return self._laws[key]
+
+    def fly(
+        self,
+        plan: FlightPlan,
+        law: str | Sequence[LawSpec],
+        *,
+        buffer: float = 0.0,
+        keep: bool = False,
+        pilot: Pilot | None = None,
+        repeat: bool = False,
+    ) -> TrialFlight:
+        """Fly a plan with a law.
+
+        Args:
+            plan: The flight.
+            law: A built-in law by name, or a chain of laws as ``rtsim.protection.laws.load_laws`` finds it.
+            buffer: Added to the margins at which a built-in law begins to act [m/s].
+            keep: Give the history arrays of their own.
+            pilot: A pilot written in Python instead of the built-in one.
+            repeat: Ask laws written in Python everything twice, to find those that keep state outside themselves.
+
+        Returns:
+            The flight.
+
+        Raises:
+            InputError: The plan's start has no trim, or there is no such law.
+        """
+        from scenarios.campaign.python_trial import fly_in_python
+
+        flying = self._prepare(plan, external=pilot is not None)
+        name = law if isinstance(law, str) else compiled_law(law)
+        problems: tuple[str, ...] = ()
+        if name is not None and pilot is None:
+            flown = self._fly_compiled(flying, self.law(name, buffer=buffer))
+        elif name is not None:
+            flown = fly_in_python(flying, self.law(name, buffer=buffer), pilot, self._work)
+        else:
+            assert not isinstance(law, str)  # a name is a compiled law
+            chain = LawChain(law, dt=self.dt, remember=repeat)
+            flown = fly_in_python(flying, chain, pilot, self._work)
+            if repeat:
+                chain.unrepeatable()
+            problems = tuple(event.text for event in chain.events)
+        metrics = np.zeros(kernels.METRIC_COUNT)
+        rows, actions = flying.rows[:flown], flying.actions[:flown]
+        kernels.measure_trial(rows, actions, flying.tables.programme, self._limits, self.dt, metrics)
+        ended = int(flying.state.clock[simulation.CLOCK_END])
+        metrics[kernels.M_COMPLETED] = float(ended == simulation.END_NONE)
+        metrics[kernels.M_YIELDED] = flying.script_state[script_kernels.S_YIELDED]
+        reason = END_REASONS[ended].format(sink=float(flying.state.clock[simulation.CLOCK_SINK]))
+        if keep:
+            rows, actions = rows.copy(), actions.copy()
+        return TrialFlight(TrialMetrics(metrics), reason, rows, actions, problems)
+
+    def _fly_compiled(self, flying: Flying, law: law_data.ProtectionTables) -> int:
+        law_state = np.zeros(law_data.LAW_STATE_SIZE)
+        law_kernels.law_start(law, law_state)
+        return int(
+            kernels.fly_trial(
+                flying.tables,
+                law,
+                flying.state,
+                law_state,
+                flying.scratch,
+                (flying.pulses, flying.script_state),
+                flying.reaction,
+                flying.noise,
+                self._work,
+                flying.rows,
+                flying.actions,
+            )
+        )
+
+    def _prepare(self, plan: FlightPlan, *, external: bool) -> Flying:
+        """Put the aircraft at the plan's start and draw its random numbers."""
+        frames = max(1, int(np.ceil(plan.duration * self.rate_hz - 1e-6)))
+        setup = FlightSetup(
+            programme=plan.programme,
+            plant=self.plant,
+            outer_loop=plan.outer_loop,
+            pilot="external" if external else "mocm",
+            corridor=self.corridor,
+            rate_hz=self.rate_hz,
+            start_airspeed=plan.start.airspeed,
+            start_nacelle=plan.start.nacelle_angle,
+            start_altitude=plan.start.altitude,
+            wind=plan.wind,
+            seed=plan.seed,
+            pilot_noise=plan.pilot_noise,
+            air=plan.air,
+            faults=plan.faults,
+        )
+        parts = self._parts_of(setup)
+        pilot_random = stream_generator(plan.seed, STREAM_PILOT)
+        air_random = stream_generator(plan.seed, STREAM_TURBULENCE)
+        state = start_state(setup, parts, air_random.standard_normal(3))
+        script_state = np.zeros(script_kernels.SCRIPT_STATE_SIZE)
+        script_kernels.script_start(script_state)
+        if len(self._rows) < frames:
+            self._rows = np.zeros((frames, SIGNAL_COUNT))
+            self._actions = np.zeros((frames, kernels.ACTION_SIZE))
+        return Flying(
+            tables=parts.tables,
+            state=state,
+            scratch=parts.scratch,
+            pulses=pulse_table(plan.pulses),
+            script_state=script_state,
+            reaction=-1.0 if plan.reaction is None else plan.reaction,
+            noise=(
+                pilot_random.standard_normal((frames, parts.noise_width)),
+                air_random.standard_normal((frames, normals_needed(state.gusts))),
+            ),
+            rows=self._rows[:frames],
+            actions=self._actions[:frames],
+            programme=plan.programme,
+        )
+
+    def _parts_of(self, setup: FlightSetup) -> Parts:
+        """Tables of a flight: the costly ones are loaded once and shared, the start is trimmed anew."""
+        key = (setup.outer_loop, setup.pilot_noise)
+        if key not in self._parts:
+            self._parts[key] = build_parts(setup)
+        parts = self._parts[key]
+        assert setup.start_airspeed is not None  # a plan has a start
+        assert setup.start_nacelle is not None
+        x, u = _trim(setup.plant, setup.start_airspeed, setup.start_nacelle)
+        x = x.copy()
+        x[STATE.altitude] = setup.start_altitude
+        programme = setup.programme
+        points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
+        tables = parts.tables._replace(
+            wind=float(setup.wind), gusts=setup.air.tables(), faults=fault_tables(setup.faults), programme=points
+        )
+        return dataclasses.replace(parts, tables=tables, start_x=x, start_u=u)
+
+
+@dataclass(frozen=True, slots=True)
+class Flying:
+    """Everything of one flight that is about to be flown."""
+
+    tables: simulation.SimulationTables
+    """The simulation."""
+    state: simulation.SimulationState
+    """Its state at the start."""
+    scratch: simulation.Scratch
+    """Its work space."""
+    pulses: FloatArray
+    """The script."""
+    script_state: FloatArray
+    """State of the script."""
+    reaction: float
+    """Reaction time of a pilot who yields [s]; negative for one who does not."""
+    noise: tuple[FloatArray, FloatArray]
+    """Standard normals of pilot and air."""
+    rows: FloatArray
+    """To be written: frame rows."""
+    actions: FloatArray
+    """To be written: what the law changes."""
+    programme: Programme
+    """What the pilot is asked to do."""
+
+
+@functools.lru_cache(maxsize=8)
+def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
+    """Trimmed state and inputs at a start, altitude 0; kept, since a twin starts like its flight."""
+    from rtsim.aircraft import Condition, Xv15
+    from rtsim.lpv.aircraft import load_aircraft
+
+    if plant == "nonlinear":
+        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
+        converged, x, u = trim.converged, trim.x, trim.u
+    else:
+        point = load_aircraft().trim(airspeed=airspeed, nacelle=nacelle)
+        converged, x, u = point.converged, point.x, point.u
+    if not converged:
+        raise InputError(
+            "the aircraft has no level-flight trim there",
+            key="start",
+            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
+            mend="start inside the conversion corridor (rtsim corridor shows it)",
+        )
+    return x.copy(), u.copy()

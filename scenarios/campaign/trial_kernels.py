@@ -1,0 +1,308 @@
+"""One trial flight in one compiled call: aircraft, pilot, script and protection law, and what it is judged by.
+
+The frame is that of ``rtsim.simulation_kernels``; between the pilot and the aircraft stand the script and the law.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rtsim.aircraft.signals import INPUT, STATE
+from rtsim.compiled import inner_kernel
+from rtsim.faults.fault_kernels import fault_nacelle_ok
+from rtsim.frame import COLUMN, FloatArray
+from rtsim.protection import law_data as law
+from rtsim.protection.law_kernels import protect
+from rtsim.protection.limiter_kernels import torque_limit
+from rtsim.simulation_kernels import (
+    CLOCK_END,
+    CLOCK_FRAME,
+    CLOCK_MODE,
+    END_NONE,
+    MODE_MOCM,
+    Scratch,
+    SimulationState,
+    SimulationTables,
+    advance,
+    observe,
+    pilot_command,
+)
+from rtsim.units import DEGREE, INCH_POUND, KNOT
+from scenarios.script_kernels import S_YIELDED, script_command, script_notice
+
+# Places in a row of actions: what the law changed in a frame, and why.
+A_STICK, A_LEVER, A_RATE, A_STICK_REASON, A_LEVER_REASON, A_RATE_REASON = 0, 1, 2, 3, 4, 5
+"""Limited minus asked: stick, lever, nacelle rate [rad/s]; reasons as in ``rtsim.protection.law_kernels``."""
+A_TIME = 6
+"""Predicted time to the corridor's boundary [s]."""
+ACTION_SIZE = 7
+
+WARNING_MARGIN = 4.0
+"""Corridor margin at which the monitor warns and a pilot who yields begins to react [kn]."""
+OUTSIDE_MARGIN, PERSISTENCE, MERGE = -0.5, 0.1, 0.5
+"""An exceedance: margin below this [kn], for this long [s]; events closer than the last are one [s]."""
+ARRIVED_AIRSPEED, ARRIVED_NACELLE = 1.0, 0.5
+"""How near the programme's end counts as arrived [kn, deg]."""
+
+# Places in the metrics of a trial, in the order of ``scenarios.verdict_metrics.TRIAL_METRICS``.
+(
+    M_EXCEEDANCES, M_DEPTH, M_OUTSIDE, M_AREA, M_MARGIN,
+    M_HEIGHT_LOST, M_HEIGHT_GAINED, M_FLAPPING, M_FLAPPING_OVER, M_TORQUE, M_TORQUE_OVER,
+    M_LOAD_MAX, M_LOAD_MIN, M_PITCH,
+    M_CORRIDOR_ACTIVATIONS, M_CORRIDOR_ACTIVE, M_OTHER_ACTIVE, M_STICK_AUTHORITY, M_LEVER_AUTHORITY,
+    M_NACELLE_REMOVED, M_STICK_STEP, M_LEVER_STEP,
+    M_COMPLETED, M_YIELDED, M_ARRIVAL, M_AIRSPEED_END, M_NACELLE_END, M_FLOWN,
+) = range(28)  # fmt: skip
+METRIC_COUNT = 28
+
+
+class TrialLimits(NamedTuple):
+    """Secondary limits that a trial is judged by. SI and radians."""
+
+    flapping: float
+    """Flapping stop [deg]."""
+    torque: law.TorqueTables
+    """Mast torque."""
+    torque_excess: float
+    """Share of the torque limit that counts as over it [-]."""
+
+
+@inner_kernel
+def fill_sensors(row: FloatArray, state: SimulationState, scratch: Scratch, sensors: FloatArray) -> None:
+    """Give what a law may know at the start of a frame, the numbers of ``Simulation.sensors``.
+
+    Args:
+        row: The frame's row as ``observe`` left it.
+        state: The simulation's state.
+        scratch: Its work space as ``observe`` left it.
+        sensors: Written, shape (SENSOR_COUNT,), SI.
+    """
+    x = state.x
+    sensors[law.SENSE_TIME] = row[COLUMN.time_s]
+    sensors[law.SENSE_AIRSPEED] = row[COLUMN.airspeed_indicated_kt] * KNOT
+    sensors[law.SENSE_AIRSPEED_RATE] = row[COLUMN.airspeed_rate_kt_s] * KNOT
+    sensors[law.SENSE_NACELLE] = scratch.motion[0]
+    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[1]
+    sensors[law.SENSE_PITCH] = x[STATE.pitch]
+    sensors[law.SENSE_PITCH_RATE] = x[STATE.q]
+    sensors[law.SENSE_FLIGHT_PATH] = row[COLUMN.flight_path_deg] * DEGREE
+    sensors[law.SENSE_ALTITUDE] = x[STATE.altitude]
+    sensors[law.SENSE_CLIMB_RATE] = row[COLUMN.climb_rate_m_s]
+    sensors[law.SENSE_LOAD_FACTOR] = row[COLUMN.load_factor]
+    sensors[law.SENSE_TORQUE] = row[COLUMN.mast_torque_inlb] * INCH_POUND
+    sensors[law.SENSE_FLAPPING] = row[COLUMN.flapping_deg] * DEGREE
+    sensors[law.SENSE_DOWNSTOP] = row[COLUMN.on_downstop]
+    sensors[law.SENSE_NACELLE_OK] = 1.0 if fault_nacelle_ok(state.faults) else 0.0
+
+
+@inner_kernel
+def ask_pilot(
+    tables: SimulationTables,
+    state: SimulationState,
+    scratch: Scratch,
+    row: FloatArray,
+    script: tuple[FloatArray, FloatArray],
+    command: FloatArray,
+) -> None:
+    """Observe, and give the command of pilot and script for the frame.
+
+    Args:
+        tables: The simulation.
+        state: Its state.
+        scratch: Its work space.
+        row: The frame's row, filled.
+        script: Pulses and script state.
+        command: Written: stick, lever, nacelle rate [rad/s].
+    """
+    observe(tables, state, scratch, row)
+    if state.clock[CLOCK_MODE] == MODE_MOCM:
+        pilot_command(tables, state, scratch, command)
+    else:
+        command[0] = state.u[INPUT.stick]
+        command[1] = state.u[INPUT.lever]
+        command[2] = 0.0
+    script_command(script[0], script[1], row[COLUMN.time_s], command)
+
+
+@inner_kernel
+def finish_frame(
+    tables: SimulationTables,
+    state: SimulationState,
+    scratch: Scratch,
+    row: FloatArray,
+    commands: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    script: tuple[FloatArray, FloatArray],
+    reaction: float,
+) -> None:
+    """Move to the next frame, and let a pilot who yields take notice of what he was shown in this one.
+
+    Args:
+        tables: The simulation.
+        state: Its state.
+        scratch: Its work space.
+        row: The frame's row, completed.
+        commands: What was asked, what acts, noise of pilot and air.
+        script: Pulses and script state.
+        reaction: Reaction time of a pilot who yields [s], negative for one who does not.
+    """
+    warned = min(scratch.shown[1], scratch.shown[2]) < WARNING_MARGIN * KNOT
+    for k in range(3):
+        warned = warned or commands[0][k] != commands[1][k]
+    shown = scratch.shown[0]
+    advance(tables, state, scratch, row, commands)
+    script_notice(script[1], reaction, state.clock[CLOCK_FRAME] * tables.dt, warned, shown, state.reference)
+
+
+@inner_kernel
+def fly_trial(
+    tables: SimulationTables,
+    protection: law.ProtectionTables,
+    state: SimulationState,
+    law_state: FloatArray,
+    scratch: Scratch,
+    script: tuple[FloatArray, FloatArray],
+    reaction: float,
+    noise: tuple[FloatArray, FloatArray],
+    work: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    rows: FloatArray,
+    actions: FloatArray,
+) -> int:
+    """Fly until the rows are full or the flight ends.
+
+    Args:
+        tables: The simulation.
+        protection: The law.
+        state: Simulation state, updated in place.
+        law_state: Law state, started.
+        scratch: Work space of the simulation.
+        script: Pulses and script state.
+        reaction: Reaction time of a pilot who yields [s], negative for one who does not.
+        noise: Standard normals of pilot and air, one row per frame.
+        work: Sensors, law's work space, command, limited command.
+        rows: Written: frame rows.
+        actions: Written: what the law changed, shape (frames, ACTION_SIZE).
+
+    Returns:
+        Frames flown.
+    """
+    sensors, law_work, command, applied = work
+    for k in range(rows.shape[0]):
+        if state.clock[CLOCK_END] != END_NONE:
+            return k
+        row, action = rows[k], actions[k]
+        ask_pilot(tables, state, scratch, row, script, command)
+        fill_sensors(row, state, scratch, sensors)
+        protect(protection, law_state, k, sensors, command, applied, law_work)
+        for c in range(3):
+            action[c] = applied[c] - command[c]
+        action[A_STICK_REASON] = law_state[law.L_STICK_CAUSE]
+        action[A_LEVER_REASON] = law_state[law.L_LEVER_CAUSE]
+        action[A_RATE_REASON] = law_state[law.L_RATE_CAUSE]
+        action[A_TIME] = law_state[law.L_TIME]
+        finish_frame(tables, state, scratch, row, (command, applied, noise[0][k], noise[1][k]), script, reaction)
+    return rows.shape[0]
+
+
+@inner_kernel
+def _is_corridor(reason: float) -> bool:
+    return reason in (law.REASON_LOW, law.REASON_HIGH, law.REASON_GATE)
+
+
+@inner_kernel
+def measure_trial(
+    rows: FloatArray,
+    actions: FloatArray,
+    programme: FloatArray,
+    limits: TrialLimits,
+    dt: float,
+    out: FloatArray,
+) -> None:
+    """Measure a trial; whether it was completed and yielded is left to the caller.
+
+    Args:
+        rows: The frames flown.
+        actions: What the law changed in them.
+        programme: The simulation's programme, whose last point is where the flight should arrive.
+        limits: Secondary limits.
+        dt: Length of a frame [s].
+        out: Written: ``M_*``, shape (METRIC_COUNT,).
+    """
+    frames = rows.shape[0]
+    out[:] = 0.0
+    out[M_MARGIN], out[M_LOAD_MIN], out[M_LOAD_MAX] = 1e9, 1e9, -1e9
+    run = 0  # frames of the present excursion
+    quiet = 1e9  # time since the last exceedance
+    unacted = 1e9  # time since the law's last corridor action
+    last = programme.shape[1] - 1
+    stick_square = lever_square = 0.0
+    for k in range(frames):
+        row, action = rows[k], actions[k]
+        margin = row[COLUMN.margin_kt]
+        out[M_MARGIN] = min(out[M_MARGIN], margin)
+        if margin < OUTSIDE_MARGIN:
+            run += 1
+            out[M_OUTSIDE] += dt
+            if run == math.ceil(PERSISTENCE / dt - 1e-9):
+                # Merged where the gap before the whole excursion is short.
+                if quiet > MERGE + 1e-9:
+                    out[M_EXCEEDANCES] += 1.0
+                quiet = 0.0
+        else:
+            if run * dt >= PERSISTENCE - 1e-9:
+                quiet = 0.0
+            elif run > 0:
+                quiet += run * dt
+            run = 0
+            quiet += dt
+        out[M_AREA] += max(-margin, 0.0) * dt
+        height = row[COLUMN.altitude_m] - row[COLUMN.altitude_reference_m]
+        out[M_HEIGHT_LOST] = max(out[M_HEIGHT_LOST], -height)
+        out[M_HEIGHT_GAINED] = max(out[M_HEIGHT_GAINED], height)
+        flapping = row[COLUMN.flapping_deg]
+        out[M_FLAPPING] = max(out[M_FLAPPING], flapping)
+        if flapping > limits.flapping:
+            out[M_FLAPPING_OVER] += dt
+        bound = torque_limit(limits.torque, row[COLUMN.airspeed_kt] * KNOT, row[COLUMN.nacelle_deg] * DEGREE)
+        share = row[COLUMN.mast_torque_inlb] * INCH_POUND / bound
+        out[M_TORQUE] = max(out[M_TORQUE], share)
+        if share > limits.torque_excess:
+            out[M_TORQUE_OVER] += dt
+        out[M_LOAD_MAX] = max(out[M_LOAD_MAX], row[COLUMN.load_factor])
+        out[M_LOAD_MIN] = min(out[M_LOAD_MIN], row[COLUMN.load_factor])
+        out[M_PITCH] = max(out[M_PITCH], abs(row[COLUMN.pitch_deg]))
+
+        corridor = other = False
+        for c in range(3):
+            reason = action[A_STICK_REASON + c]
+            if reason != 0.0:
+                if _is_corridor(reason):
+                    corridor = True
+                else:
+                    other = True
+        unacted += dt
+        if corridor:
+            if unacted > MERGE + 1e-9:
+                out[M_CORRIDOR_ACTIVATIONS] += 1.0
+            unacted = 0.0
+            out[M_CORRIDOR_ACTIVE] += dt
+        if other:
+            out[M_OTHER_ACTIVE] += dt
+        stick_square += action[A_STICK] ** 2
+        lever_square += action[A_LEVER] ** 2
+        out[M_NACELLE_REMOVED] += abs(action[A_RATE]) * dt / DEGREE
+        if k > 0:
+            out[M_STICK_STEP] = max(out[M_STICK_STEP], abs(action[A_STICK] - actions[k - 1, A_STICK]))
+            out[M_LEVER_STEP] = max(out[M_LEVER_STEP], abs(action[A_LEVER] - actions[k - 1, A_LEVER]))
+        away = abs(row[COLUMN.airspeed_kt] - programme[1, last] / KNOT) > ARRIVED_AIRSPEED
+        if away or abs(row[COLUMN.nacelle_deg] - programme[2, last] / DEGREE) > ARRIVED_NACELLE:
+            out[M_ARRIVAL] = (k + 1) * dt
+    out[M_DEPTH] = max(-out[M_MARGIN], 0.0)
+    out[M_STICK_AUTHORITY] = math.sqrt(stick_square / frames)
+    out[M_LEVER_AUTHORITY] = math.sqrt(lever_square / frames)
+    out[M_AIRSPEED_END] = rows[frames - 1, COLUMN.airspeed_kt]
+    out[M_NACELLE_END] = rows[frames - 1, COLUMN.nacelle_deg]
+    out[M_FLOWN] = frames * dt
+
+
+__all__ = ["S_YIELDED", "ask_pilot", "fill_sensors", "finish_frame", "fly_trial", "measure_trial"]
