@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from rtsim.cli.flight_condition import (
+    Request,
+    checked,
+    closed_loop_model,
+    database_model,
+    database_trim,
+    eigenvalues,
+    no_trim,
+    nonlinear_model,
+    nonlinear_trim,
+)
 from rtsim.cli.output import emit_json, results
-from rtsim.errors import InputError, TrimError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    import numpy as np
-    import numpy.typing as npt
-
-    from rtsim.aircraft import Condition, TrimPoint, Variable
-    from rtsim.lpv import LpvAircraft
-
-    FloatArray = npt.NDArray[np.float64]
-
-ENGINE_EFFICIENCY = 0.93
-"""Shaft power of both rotors over engine power."""
 
 _AIRSPEED = typer.Option(help="Horizontal airspeed [kn].")
 _NACELLE = typer.Option(help="Nacelle angle [deg], 90 helicopter, 0 airplane.")
@@ -38,47 +32,6 @@ _DATABASE = typer.Option(help="Another LPV database than the shipped one (.nc or
 _CLOSED_LOOP = typer.Option("--closed-loop", help="Aircraft, pilot and outer loops together, sampled as flown.")
 _OUTER_LOOP = typer.Option(help="How the pilot holds airspeed and altitude: integrators or pi (with --closed-loop).")
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
-
-
-@dataclass(frozen=True, slots=True)
-class Request:
-    """A flight condition as asked for on the command line, in the units of the options."""
-
-    airspeed_kt: float
-    """Horizontal airspeed."""
-    nacelle_deg: float
-    """Nacelle angle."""
-    nonlinear: bool
-    """Solve the nonlinear model even at the default condition."""
-    flap_deg: float | None
-    """Flap deflection; None: the schedule."""
-    rotor_rpm: float | None
-    """Rotor speed; None: the database's."""
-    weight_lb: float | None
-    """Weight; None: the database's."""
-    altitude_m: float | None
-    """Pressure altitude; None: sea level."""
-    acceleration_kt_s: float | None
-    """Level acceleration; None: none."""
-    database: Path | None
-    """Database file; None: the shipped one."""
-
-    @property
-    def solves_nonlinear(self) -> bool:
-        """Whether the nonlinear model must be solved: the database holds one condition only."""
-        asked = (self.flap_deg, self.rotor_rpm, self.weight_lb, self.altitude_m, self.acceleration_kt_s)
-        return self.nonlinear or any(value is not None for value in asked)
-
-
-_LIMITS: tuple[tuple[str, float, float, str], ...] = (
-    ("airspeed_kt", -100.0, 400.0, "kn"),
-    ("nacelle_deg", 0.0, 95.0, "deg"),
-    ("flap_deg", 0.0, 75.0, "deg"),
-    ("rotor_rpm", 100.0, 1000.0, "rpm"),
-    ("weight_lb", 5000.0, 20000.0, "lb"),
-    ("altitude_m", -1000.0, 11000.0, "m"),
-    ("acceleration_kt_s", -20.0, 20.0, "kn/s"),
-)
 
 
 def register(app: typer.Typer) -> None:
@@ -124,18 +77,18 @@ def trim_command(
     Raises:
         TrimError: There is no trim; the JSON object is printed all the same, with ``converged`` false and null values.
     """
-    request = _checked(
+    request = checked(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
                 database)
     )  # fmt: skip
     if request.solves_nonlinear:
-        result, point = _nonlinear_trim(request)
+        result, point = nonlinear_trim(request)
     else:
-        result, point = _database_trim(request)
+        result, point = database_trim(request)
     if json:
         emit_json(result)
     if not point.converged:
-        raise _no_trim(request, point)
+        raise no_trim(request, point)
     if not json:
         _print_trim(result)
 
@@ -179,251 +132,20 @@ def linearize_command(
         TrimError: There is no trim to linearize at.
         InputError: An option is out of range, or the closed loop is asked for where no pilot was designed.
     """
-    request = _checked(
+    request = checked(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
                 database)
     )  # fmt: skip
     if closed_loop:
-        model = _closed_loop_model(request, outer_loop)
+        model = closed_loop_model(request, outer_loop)
     else:
-        model = _nonlinear_model(request) if request.solves_nonlinear else _database_model(request)
+        model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
         model["eigenvalues"] = eigenvalues(model["A"])
     result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
     if json:
         emit_json(result)
     else:
         _print_model(result)
-
-
-def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
-    """Eigenvalues with natural frequency and damping ratio, slowest first.
-
-    Args:
-        A: State matrix (n, n) [1/s].
-
-    Returns:
-        For each: ``re``, ``im``, ``wn_rad_s`` and ``zeta`` (1 or -1 for real ones, 0 at the origin).
-    """
-    import numpy as np
-
-    return _described(np.linalg.eigvals(A))
-
-
-def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
-    return [
-        {
-            "re": float(root.real),
-            "im": float(root.imag),
-            "wn_rad_s": float(abs(root)),
-            "zeta": float(-root.real / abs(root)) if abs(root) > 0.0 else 0.0,
-        }
-        for root in sorted(roots, key=lambda root: (abs(root), root.imag))
-    ]
-
-
-def _checked(request: Request) -> Request:
-    for name, low, high, unit in _LIMITS:
-        value = getattr(request, name)
-        if value is not None and not (math.isfinite(value) and low <= value <= high):
-            option = "--" + name.replace("_", "-")
-            raise InputError("out of range", key=option, value=value, allowed=f"{low:g} to {high:g} {unit}")
-    return request
-
-
-def _condition(request: Request) -> Condition:
-    from rtsim.aircraft import Condition
-    from rtsim.units import deg, kt, lb, rpm
-
-    return Condition(
-        airspeed=kt(request.airspeed_kt),
-        nacelle_angle=deg(request.nacelle_deg),
-        acceleration=kt(request.acceleration_kt_s or 0.0),
-        flap=None if request.flap_deg is None else deg(request.flap_deg),
-        rotor_speed=None if request.rotor_rpm is None else rpm(request.rotor_rpm),
-        mass=None if request.weight_lb is None else lb(request.weight_lb),
-        pressure_altitude=request.altitude_m or 0.0,
-    )
-
-
-def _nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
-    from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Xv15
-    from rtsim.aircraft.dynamics_kernels import flap_schedule
-    from rtsim.units import to_deg, to_rpm
-
-    aircraft = Xv15.load()
-    condition = _condition(request)
-    point = aircraft.trim(condition)
-    tables = aircraft.tables
-    flap = condition.flap
-    if flap is None:
-        flap = float(flap_schedule(tables.controls, condition.airspeed, condition.nacelle_angle))
-    rotor_speed = tables.configuration.rotor_speed if condition.rotor_speed is None else condition.rotor_speed
-    values = _named(point, STATES, INPUTS, OUTPUTS)
-    return _trim_result(request, values, to_deg(flap), to_rpm(float(rotor_speed)), point.converged), point
-
-
-def _database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
-    from rtsim.units import deg, kt, to_deg, to_rpm
-
-    aircraft = _lpv(request)
-    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
-    point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
-    database = aircraft.database
-    flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
-    values = _named(point, database.states, database.inputs, database.outputs)
-    return _trim_result(request, values, to_deg(flap), to_rpm(database.rotor_speed), point.converged), point
-
-
-def _lpv(request: Request) -> LpvAircraft:
-    from rtsim.lpv import load_aircraft
-
-    return load_aircraft(request.database)
-
-
-def _named(
-    point: TrimPoint,
-    states: tuple[Variable, ...],
-    inputs: tuple[Variable, ...],
-    outputs: tuple[Variable, ...],
-) -> dict[str, float]:
-    values: dict[str, float] = {}
-    for variables, vector in ((states, point.x), (inputs, point.u), (outputs, point.y)):
-        values |= {variable.name: float(value) for variable, value in zip(variables, vector, strict=True)}
-    return values
-
-
-def _trim_result(
-    request: Request, values: dict[str, float], flap_deg: float, rotor_rpm: float, converged: bool
-) -> dict[str, Any]:
-    from rtsim.corridor import load_corridor
-    from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, STICK_HALF_TRAVEL_IN, deg, kt, to_deg
-
-    solved = {
-        "pitch_deg": to_deg(values["pitch"]),
-        "stick_in": values["stick"] * STICK_HALF_TRAVEL_IN,
-        "elevator_deg": to_deg(values["elevator"]),
-        "cyclic_deg": to_deg(values["cyclic_1s"]),
-        "collective_75_deg": to_deg(values["collective_75"]),
-        "lever_fraction": values["lever"],
-        "thrust_per_rotor_lb": values["thrust"] / POUND_FORCE,
-        "power_shp": values["power"] / HORSEPOWER,
-        "engine_power_shp": values["power"] / HORSEPOWER / ENGINE_EFFICIENCY,
-        "mast_torque_inlb": values["torque"] / INCH_POUND,
-        "flapping_deg": to_deg(math.hypot(values["flap_1c"], values["flap_1s"])),
-    }
-    return {
-        "airspeed_kt": request.airspeed_kt,
-        "nacelle_deg": request.nacelle_deg,
-        "flap_deg": flap_deg,
-        "rotor_rpm": rotor_rpm,
-        # where nothing was solved, the last iterate is no answer
-        **(solved if converged else dict.fromkeys(solved)),
-        "converged": converged,
-        "inside_corridor": load_corridor("design").inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
-        "source": "nonlinear" if request.solves_nonlinear else "database",
-    }
-
-
-def _no_trim(request: Request, point: TrimPoint) -> TrimError:
-    where = f"{request.airspeed_kt:g} kn at nacelle {request.nacelle_deg:g} deg"
-    left = f"; '{point.unclosed}' does not close" if getattr(point, "unclosed", "") else ""
-    mend = "see the feasible region with 'rtsim model info'"
-    if not request.solves_nonlinear:
-        mend += ", or solve exactly there with --nonlinear"
-    return TrimError(f"there is no level-flight trim at {where}{left}", mend=mend)
-
-
-def _nonlinear_model(request: Request) -> dict[str, Any]:
-    from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Xv15
-
-    aircraft, condition = Xv15.load(), _condition(request)
-    point = aircraft.trim(condition)
-    if not point.converged:
-        raise _no_trim(request, point)
-    model = aircraft.linearize(condition, point)
-    return _model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
-
-
-def _database_model(request: Request) -> dict[str, Any]:
-    from rtsim.units import deg, kt
-
-    aircraft = _lpv(request)
-    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
-    matrices = aircraft.matrices(airspeed=airspeed, nacelle=nacelle)
-    if not aircraft.is_valid(airspeed=airspeed, nacelle=nacelle):
-        raise _no_trim(request, aircraft.trim(airspeed=airspeed, nacelle=nacelle))
-    database = aircraft.database
-    return _model_result((database.states, database.inputs, database.outputs), matrices)
-
-
-def _closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
-    """The frozen loop of aircraft and pilot, sampled as flown."""
-    import numpy as np
-
-    from rtsim.pilot.frozen import Condition as Command
-    from rtsim.pilot.frozen import frozen_loop
-    from rtsim.pilot.schedule import OUTER_LOOPS
-    from rtsim.units import deg, kt
-
-    if request.solves_nonlinear:
-        raise InputError(
-            "the pilot is designed for the database's own condition",
-            key="--closed-loop",
-            mend="leave out --nonlinear, flaps, rotor speed, weight, altitude and acceleration",
-        )
-    chosen = next((name for name in OUTER_LOOPS if name == outer_loop), None)
-    if chosen is None:
-        raise InputError("no such outer loop", key="--outer-loop", value=outer_loop, allowed=", ".join(OUTER_LOOPS))
-    aircraft = _lpv(request)
-    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
-    point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
-    if not point.converged:
-        raise _no_trim(request, point)
-    database = aircraft.database
-    if chosen not in database.pilot:
-        raise InputError(
-            "the database holds no gains of this pilot",
-            key="--outer-loop",
-            value=outer_loop,
-            allowed=", ".join(database.pilot) or "none",
-            mend="run 'rtsim model build'",
-        )
-    loop = frozen_loop(database, Command(airspeed, nacelle), outer_loop=chosen)
-    matrix = loop.matrix
-    pilot_states = matrix.shape[0] - len(database.states)
-    names = [variable.name for variable in database.states] + [f"pilot_{k}" for k in range(pilot_states)]
-    growth = loop.growth()
-    return {
-        "states": names,
-        "inputs": [],
-        "outputs": [],
-        "units": {
-            "states": [variable.unit for variable in database.states] + [""] * pilot_states,
-            "inputs": [],
-            "outputs": [],
-        },
-        "A": matrix,
-        "B": np.zeros((len(names), 0)),
-        "C": np.zeros((0, len(names))),
-        "D": np.zeros((0, 0)),
-        "dt_s": loop.dt,
-        "outer_loop": outer_loop,
-        "eigenvalues": _described(loop.eigenvalues()),
-        "growth_rad_s": growth,
-        "stable": growth < 0.0,
-    }
-
-
-def _model_result(
-    variables: tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]],
-    matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
-) -> dict[str, Any]:
-    kinds = ("states", "inputs", "outputs")
-    return {
-        **{kind: [variable.name for variable in row] for kind, row in zip(kinds, variables, strict=True)},
-        "units": {kind: [variable.unit for variable in row] for kind, row in zip(kinds, variables, strict=True)},
-        **dict(zip("ABCD", matrices, strict=True)),
-    }
 
 
 def _print_trim(result: dict[str, Any]) -> None:

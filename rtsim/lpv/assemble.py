@@ -8,7 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from rtsim.errors import InputError
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays, fill_invalid
+from rtsim.lpv.database import GRIDDED, Database, PilotArrays, fill_invalid
+from rtsim.lpv.validation import AXES
 from rtsim.lpv.variables import Variable
 
 OPTIONAL: Final = ("valid", "xdot_ref", "df_dnacelle", "flap", "rotor_speed")

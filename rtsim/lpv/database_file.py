@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from rtsim.errors import InputError, OutputError
 from rtsim.lpv.assemble import KINDS, assemble_database
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.lpv.validation import AXES
 from rtsim.lpv.variables import Variable
 
 SHIPPED: Final = Path(__file__).parent / "data" / "xv15_lpv.nc"

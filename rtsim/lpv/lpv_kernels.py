@@ -1,299 +1,73 @@
 """Compiled LPV aircraft: state derivative, outputs and one Runge-Kutta step.
 
-Legend: x total state, u total input, y output, rho = (airspeed V, nacelle angle n, angle of attack alpha). A cell is
-one grid point of one layer, flattened to ``[x_ref | u_ref | xdot_ref | columns of A | columns of B]``; rows of
-``xdot_ref``, ``A`` and ``B`` are the *active* ones (not zero everywhere), padded with zeros to a multiple of four, and
-the columns are the active ones, stored one after the other so that each multiply-add runs down contiguous memory.
-
-Every sum has a fixed order and no library routine is called, so results are bit-reproducible on one machine type.
+Every sum has a fixed order and no library routine is called, so results are bit-reproducible on one machine type. The
+tables and their legend are in ``rtsim.lpv.schedule_kernels``.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from rtsim.aircraft.signals import SCHEDULING_SPEED
 from rtsim.compiled import inner_kernel
+from rtsim.lpv.schedule_kernels import (
+    FLAG_AIRSPEED_HIGH,
+    FLAG_AIRSPEED_LOW,
+    FLAG_NACELLE,
+    FLAG_NO_TRIM,
+    FORM_LAYERED,
+    FORM_PLAIN,
+    FORM_STITCHED,
+    R_ALTITUDE,
+    R_FORM,
+    R_INPUTS,
+    R_NACELLE_ACCELERATION,
+    R_NACELLE_RATE,
+    R_OUTPUT_ROWS,
+    R_OUTPUTS,
+    R_PITCH,
+    R_Q,
+    R_REFRESH,
+    R_ROWS,
+    R_STATES,
+    R_U,
+    R_W,
+    REFRESH_EVERY_STAGE,
+    REFRESH_ONCE,
+    REFRESH_REFERENCE,
+    W_BLEND,
+    W_FLAGS,
+    FloatArray,
+    IntArray,
+    LpvTables,
+    blend,
+    locate,
+    rows_at,
+    scheduling_alpha,
+    scratch_at,
+    work_size,
+)
 from rtsim.units import GRAVITY
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-
-FORM_PLAIN = 0
-"""The paper's form: linear models interpolated in airspeed and nacelle angle."""
-FORM_STITCHED = 1
-"""Gravity, Coriolis and kinematic terms nonlinear; aerodynamics from the level layer."""
-FORM_LAYERED = 2
-"""Stitched, with the aerodynamics blended between the layers by angle of attack (the default)."""
-
-REFRESH_ONCE = 0
-"""Interpolate once per step, at the state at its start and the nacelle angle at its middle."""
-REFRESH_REFERENCE = 1
-"""Interpolate the matrices once per step, trim state and input in each of its four stages."""
-REFRESH_EVERY_STAGE = 2
-"""Interpolate everything in each stage."""
-
-FLAG_AIRSPEED_LOW = 1
-"""Bit of the flags: below the slowest airspeed of the grid; the slowest is used."""
-FLAG_AIRSPEED_HIGH = 2
-"""Bit of the flags: above the fastest airspeed of the grid; the fastest is used."""
-FLAG_NACELLE = 4
-"""Bit of the flags: nacelle angle outside the grid; the nearest is used."""
-FLAG_NO_TRIM = 8
-"""Bit of the flags: a neighbouring grid point has no trim and was filled from the nearest airspeed that has one."""
-
-ALPHA_SPEED = SCHEDULING_SPEED
-"""V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
-GAP_NONE = math.radians(1.0)
-"""Layers whose angles of attack differ by less than this are not blended [rad]."""
-GAP_FULL = math.radians(2.0)
-"""From this difference on they are blended in full; between the two the blend fades in [rad]."""
-
-# positions in LpvTables.roles
-R_FORM = 0
-R_LEVEL = 1
-R_U = 2
-R_W = 3
-R_Q = 4
-R_PITCH = 5
-R_ALTITUDE = 6
-R_NACELLE_RATE = 7
-R_NACELLE_ACCELERATION = 8
-R_STATES = 9
-R_INPUTS = 10
-R_OUTPUTS = 11
-R_ROWS = 12
-R_OUTPUT_ROWS = 13
-R_REFRESH = 14
-R_COUNT = 15
-
-# positions in the work array; the sections after the last are laid out by `work_size`
-W_FLAGS = 0
-W_ALPHA = 1
-W_CORNER = 2
-W_LAYER_SHARE = 6
-W_MAX_LAYERS = 8
-W_BLEND = W_LAYER_SHARE + W_MAX_LAYERS
-
-
-class LpvTables(NamedTuple):
-    """A database prepared for the kernels by ``rtsim.lpv.tables.prepare_tables``; read-only."""
-
-    airspeed: FloatArray
-    """Airspeed axis (V,) [m/s], ascending."""
-    nacelle: FloatArray
-    """Nacelle axis (N,) [rad], ascending."""
-    alpha: FloatArray
-    """Scheduling angle of attack of each trim (V, N, L) [rad]."""
-    valid: FloatArray
-    """1.0 where the level layer has a trim, 0.0 where it was filled (V, N)."""
-    cells: FloatArray
-    """Dynamics of each cell (V, N, L, block), see the module's legend."""
-    output_cells: FloatArray
-    """Outputs of each cell (V, N, L, block): ``[y_ref | columns of C | columns of D]``, rows padded."""
-    rows: IntArray
-    """State number of each active row."""
-    state_columns: IntArray
-    """State number of each active column of A."""
-    input_columns: IntArray
-    """Input number of each active column of B."""
-    roles: IntArray
-    """Form, sizes and positions of the variables that have a meaning here (``R_*``)."""
-
-
-@inner_kernel
-def _rows_at(tables: LpvTables) -> int:
-    """Where the row sums stand in the work array; the scratch vectors follow at `_scratch_at`."""
-    return W_BLEND + max(tables.cells.shape[3], tables.output_cells.shape[3])
-
-
-@inner_kernel
-def _scratch_at(tables: LpvTables) -> int:
-    return _rows_at(tables) + max(tables.roles[R_ROWS], tables.roles[R_OUTPUT_ROWS])
-
-
-@inner_kernel
-def work_size(tables: LpvTables) -> int:
-    """Give the length of the work array that the kernels need.
-
-    Args:
-        tables: Prepared tables.
-
-    Returns:
-        The number of float64 values.
-    """
-    return _scratch_at(tables) + 4 * tables.roles[R_STATES] + 2 * tables.roles[R_INPUTS]
-
-
-@inner_kernel
-def _cell_below(axis: FloatArray, value: float) -> int:
-    """Number of the grid interval that holds a value (clipped to the first and last)."""
-    low = 0
-    high = axis.shape[0] - 1
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if axis[middle] <= value:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inner_kernel
-def _smoothstep(s: float) -> float:
-    if s <= 0.0:
-        return 0.0
-    if s >= 1.0:
-        return 1.0
-    return s * s * (3.0 - 2.0 * s)
-
-
-@inner_kernel
-def _layer_step(alpha: float, here: float, beyond: float) -> float:
-    """How far the angle of attack has gone from one layer towards the next, smoothed, in [0, 1]."""
-    gap = beyond - here
-    size = abs(gap)
-    if size < GAP_NONE:
-        return 0.0
-    fade = _smoothstep((size - GAP_NONE) / (GAP_FULL - GAP_NONE))
-    return fade * _smoothstep((alpha - here) / gap)
-
-
-@inner_kernel
-def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
-    """Angle of attack as used for scheduling: with a headwind of V0 added, so that it is defined in hover.
-
-    In rearward flight the headwind grows by the rearward speed; the angle then stays continuous at -V0, where it would
-    otherwise turn by half a circle.
-
-    Args:
-        u: Air-relative velocity along body x [m/s].
-        w: Air-relative velocity along body z [m/s].
-        sine: Sine of the pitch attitude.
-        cosine: Cosine of the pitch attitude.
-
-    Returns:
-        The angle [rad]; the pitch attitude in any level flight.
-    """
-    headwind = ALPHA_SPEED + max(0.0, -(u * cosine + w * sine))
-    return math.atan2(w + headwind * sine, u + headwind * cosine)
-
-
-@inner_kernel
-def _locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatArray) -> tuple[int, int]:
-    """Find the cell of the present state: corner weights, layer shares and flags into ``work``."""
-    roles = tables.roles
-    u = x[roles[R_U]]
-    w = x[roles[R_W]]
-    pitch = x[roles[R_PITCH]]
-    sine = math.sin(pitch)
-    cosine = math.cos(pitch)
-    airspeed = u * cosine + w * sine
-    flags = int(work[W_FLAGS])
-
-    last_v = tables.airspeed.shape[0] - 1
-    last_n = tables.nacelle.shape[0] - 1
-    i = _cell_below(tables.airspeed, airspeed)
-    j = _cell_below(tables.nacelle, nacelle_angle)
-    s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
-    t = (nacelle_angle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
-    # 1e-9 of a cell: rounding of an angle on the stop is not an excursion
-    if i == 0 and s < -1e-9:
-        flags |= FLAG_AIRSPEED_LOW
-    if i == last_v - 1 and s > 1.0 + 1e-9:
-        flags |= FLAG_AIRSPEED_HIGH
-    if (j == 0 and t < -1e-9) or (j == last_n - 1 and t > 1.0 + 1e-9):
-        flags |= FLAG_NACELLE
-    s = min(1.0, max(0.0, s))
-    t = min(1.0, max(0.0, t))
-    w00 = (1.0 - s) * (1.0 - t)
-    w01 = (1.0 - s) * t
-    w10 = s * (1.0 - t)
-    w11 = s * t
-    work[W_CORNER] = w00
-    work[W_CORNER + 1] = w01
-    work[W_CORNER + 2] = w10
-    work[W_CORNER + 3] = w11
-    covered = (
-        w00 * tables.valid[i, j]
-        + w01 * tables.valid[i, j + 1]
-        + w10 * tables.valid[i + 1, j]
-        + w11 * tables.valid[i + 1, j + 1]
-    )
-    if covered < 1.0 - 1e-9:
-        flags |= FLAG_NO_TRIM
-    work[W_FLAGS] = flags
-
-    layers = tables.alpha.shape[2]
-    level = roles[R_LEVEL]
-    for layer in range(layers):
-        work[W_LAYER_SHARE + layer] = 0.0
-    if layers == 1:
-        work[W_LAYER_SHARE] = 1.0
-        return i, j
-    alpha = scheduling_alpha(u, w, sine, cosine)
-    work[W_ALPHA] = alpha
-    # Walk outwards from the level layer. `gone` is the share that has left the layer before; the decelerating side
-    # gets its part of what the accelerating side left, so that the shares always add up to one.
-    rest = 1.0
-    for side in range(2):
-        direction = 1 - 2 * side
-        gone = rest
-        layer = level
-        here = _corner_alpha(tables, i, j, layer, work)
-        while 0 <= layer + direction < layers:
-            beyond = _corner_alpha(tables, i, j, layer + direction, work)
-            further = gone * _layer_step(alpha, here, beyond)
-            if layer == level:
-                rest -= further
-            else:
-                work[W_LAYER_SHARE + layer] = gone - further
-            layer += direction
-            gone = further
-            here = beyond
-        if layer != level:
-            work[W_LAYER_SHARE + layer] = gone
-    work[W_LAYER_SHARE + level] = rest
-    return i, j
-
-
-@inner_kernel
-def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArray) -> float:
-    return (
-        work[W_CORNER] * tables.alpha[i, j, layer]
-        + work[W_CORNER + 1] * tables.alpha[i, j + 1, layer]
-        + work[W_CORNER + 2] * tables.alpha[i + 1, j, layer]
-        + work[W_CORNER + 3] * tables.alpha[i + 1, j + 1, layer]
-    )
-
-
-@inner_kernel
-def _blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, target: FloatArray) -> None:
-    """Interpolate the first ``count`` entries of the cells around (i, j)."""
-    fresh = True
-    for layer in range(cells.shape[2]):
-        share = work[W_LAYER_SHARE + layer]
-        if share == 0.0:
-            continue
-        w0 = share * work[W_CORNER]
-        w1 = share * work[W_CORNER + 1]
-        w2 = share * work[W_CORNER + 2]
-        w3 = share * work[W_CORNER + 3]
-        c0 = cells[i, j, layer]
-        c1 = cells[i, j + 1, layer]
-        c2 = cells[i + 1, j, layer]
-        c3 = cells[i + 1, j + 1, layer]
-        if fresh:
-            for k in range(count):
-                target[k] = w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
-            fresh = False
-        else:
-            for k in range(count):
-                target[k] += w0 * c0[k] + w1 * c1[k] + w2 * c2[k] + w3 * c3[k]
+__all__ = [
+    "FLAG_AIRSPEED_HIGH",
+    "FLAG_AIRSPEED_LOW",
+    "FLAG_NACELLE",
+    "FLAG_NO_TRIM",
+    "FORM_LAYERED",
+    "FORM_PLAIN",
+    "FORM_STITCHED",
+    "REFRESH_EVERY_STAGE",
+    "REFRESH_ONCE",
+    "REFRESH_REFERENCE",
+    "W_FLAGS",
+    "LpvTables",
+    "lpv_derivative",
+    "lpv_outputs",
+    "lpv_step",
+    "lpv_step_steady",
+    "scheduling_alpha",
+    "work_size",
+]
 
 
 @inner_kernel
@@ -368,9 +142,9 @@ def lpv_derivative(
     """
     inputs_end = W_BLEND + tables.roles[R_STATES] + tables.roles[R_INPUTS]
     block = tables.cells.shape[3]
-    rows_at, scratch_at = _rows_at(tables), _scratch_at(tables)
-    i, j = _locate(tables, x, nacelle_angle, work)
-    _blend(tables.cells, i, j, block, work, work[W_BLEND : W_BLEND + block])
+    sums, scratch = rows_at(tables), scratch_at(tables)
+    i, j = locate(tables, x, nacelle_angle, work)
+    blend(tables.cells, i, j, block, work, work[W_BLEND : W_BLEND + block])
     _apply(
         tables,
         x,
@@ -378,8 +152,8 @@ def lpv_derivative(
         xdot,
         work[W_BLEND:inputs_end],
         work[inputs_end : W_BLEND + block],
-        work[scratch_at:],
-        work[rows_at:scratch_at],
+        work[scratch:],
+        work[sums:scratch],
     )
 
 
@@ -402,19 +176,19 @@ def lpv_outputs(
     inputs = roles[R_INPUTS]
     outputs = roles[R_OUTPUTS]
     rows = roles[R_OUTPUT_ROWS]
-    i, j = _locate(tables, x, nacelle_angle, work)
+    i, j = locate(tables, x, nacelle_angle, work)
     block = tables.output_cells.shape[3]
     model = work[W_BLEND : W_BLEND + max(block, states + inputs)]
-    _blend(tables.cells, i, j, states + inputs, work, model)
-    deviation = work[_scratch_at(tables) :]
+    blend(tables.cells, i, j, states + inputs, work, model)
+    deviation = work[scratch_at(tables) :]
     for k in range(states):
         deviation[k] = x[k] - model[k]
     if roles[R_ALTITUDE] >= 0:
         deviation[roles[R_ALTITUDE]] = 0.0
     for k in range(inputs):
         deviation[states + k] = u[k] - model[states + k]
-    _blend(tables.output_cells, i, j, block, work, model)
-    total = work[_rows_at(tables) : _rows_at(tables) + rows]
+    blend(tables.output_cells, i, j, block, work, model)
+    total = work[rows_at(tables) : rows_at(tables) + rows]
     for k in range(rows):
         total[k] = model[k]
     position = rows
@@ -451,11 +225,11 @@ def lpv_step(
     rate = roles[R_NACELLE_RATE]
     acceleration = roles[R_NACELLE_ACCELERATION]
     block = tables.cells.shape[3]
-    scratch = _scratch_at(tables)
+    scratch = scratch_at(tables)
     model = work[W_BLEND : W_BLEND + block]
     reference = work[W_BLEND : W_BLEND + states + inputs]
     columns = work[W_BLEND + states + inputs : W_BLEND + block]
-    row_sums = work[_rows_at(tables) : scratch]
+    row_sums = work[rows_at(tables) : scratch]
     stage_x = work[scratch : scratch + states]
     slope = work[scratch + states : scratch + 2 * states]
     total = work[scratch + 2 * states : scratch + 3 * states]
@@ -468,8 +242,8 @@ def lpv_step(
         total[k] = 0.0
     work[W_FLAGS] = 0.0
     if refresh == REFRESH_ONCE:
-        i, j = _locate(tables, x, nacelle_path[1, 0], work)
-        _blend(tables.cells, i, j, block, work, model)
+        i, j = locate(tables, x, nacelle_path[1, 0], work)
+        blend(tables.cells, i, j, block, work, model)
     for stage in range(4):
         row = (stage + 1) // 2
         if rate >= 0:
@@ -477,9 +251,9 @@ def lpv_step(
         if acceleration >= 0:
             stage_u[acceleration] = nacelle_path[row, 2]
         if refresh != REFRESH_ONCE:
-            i, j = _locate(tables, stage_x, nacelle_path[row, 0], work)
+            i, j = locate(tables, stage_x, nacelle_path[row, 0], work)
             whole = refresh == REFRESH_EVERY_STAGE or stage == 0
-            _blend(tables.cells, i, j, block if whole else states + inputs + row_sums.shape[0], work, model)
+            blend(tables.cells, i, j, block if whole else states + inputs + row_sums.shape[0], work, model)
         _apply(tables, stage_x, stage_u, slope, reference, columns, deviation, row_sums)
         weight = 2.0 if 0 < stage < 3 else 1.0
         ahead = dt if stage == 2 else 0.5 * dt

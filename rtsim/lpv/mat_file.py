@@ -12,7 +12,8 @@ import numpy as np
 
 from rtsim.errors import InputError, OutputError
 from rtsim.lpv.assemble import KINDS, assemble_database
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.lpv.validation import AXES
 from rtsim.lpv.variables import Variable
 
 _DIMENSIONS = {"x_ref": 4, "u_ref": 4, "y_ref": 4, "xdot_ref": 4, "df_dnacelle": 4, "valid": 3, "flap": 2,

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.errors import InputError
-from rtsim.lpv import lpv_kernels as kernels
+from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
-from rtsim.lpv.lpv_kernels import LpvTables
+from rtsim.lpv.schedule_kernels import LpvTables
 from rtsim.lpv.variables import NACELLE_INPUTS, RIGID_BODY_STATES, SCHEDULING_STATES, position, required_position
 from rtsim.units import GRAVITY
 
@@ -99,7 +99,7 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
 
 
 def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
-    """Angle of attack as used for scheduling, see ``lpv_kernels.scheduling_alpha``.
+    """Angle of attack as used for scheduling, see ``schedule_kernels.scheduling_alpha``.
 
     Args:
         database: Says where u, w and pitch stand.

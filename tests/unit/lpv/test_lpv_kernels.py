@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtsim.lpv import lpv_kernels as kernels
+from rtsim.lpv import schedule_kernels as schedule
 from rtsim.lpv.tables import prepare_tables
 from rtsim.units import GRAVITY
 
@@ -185,7 +186,7 @@ def test_step_equals_twin_and_is_bit_reproducible(toy_database, form):
     for frame in range(40):
         path = np.array([[nacelle + rate * (frame + c) * dt, rate, 0.1 * c] for c in (0.0, 0.5, 1.0)])
         kernels.lpv_step(tables, x, u, path, dt, work)
-        work[kernels.W_BLEND :] = rng.normal(size=work.size - kernels.W_BLEND)  # nothing may be carried over
+        work[schedule.W_BLEND :] = rng.normal(size=work.size - schedule.W_BLEND)  # nothing may be carried over
         kernels.lpv_step(tables, again, u, path, dt, work)
         reference = twin.step(reference, u, path, dt, RATE, ACCELERATION)
     np.testing.assert_allclose(x, reference, rtol=1e-9, atol=1e-9)
@@ -268,7 +269,7 @@ def test_layer_shares_sum_to_one_and_are_continuous(toy_database, seed):
     for shift in (0.0, 1e-7):
         work, xdot = np.zeros(kernels.work_size(tables)), np.zeros(x.size)
         kernels.lpv_derivative(tables, x + shift, u, nacelle, xdot, work)
-        shares.append(work[kernels.W_LAYER_SHARE : kernels.W_LAYER_SHARE + 3].copy())
+        shares.append(work[schedule.W_LAYER_SHARE : schedule.W_LAYER_SHARE + 3].copy())
         assert shares[-1].min() >= 0.0
         assert abs(shares[-1].sum() - 1.0) < 1e-12
     assert np.abs(shares[0] - shares[1]).max() < 1e-4
