@@ -108,6 +108,23 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("gust_w_m_s", "m/s", "air", "Gust added to the air-relative velocity along body z."),
     Signal("gust_q_deg_s", "deg/s", "air", "Pitch gust added to the air-relative pitch rate."),
     Signal("failures", "", "failures", "Active failures, a sum of the bits in docs/faults.md."),
+    Signal("protection_stick", "", "protection", "Stick after minus before protection."),
+    Signal("protection_lever", "", "protection", "Lever after minus before protection."),
+    Signal("protection_nacelle_rate_deg_s", "deg/s", "protection", "Nacelle rate after minus before protection."),
+    Signal(
+        "protection_stick_reason",
+        "",
+        "protection",
+        "Limit that changed the stick: 0 none, else its number in docs/protection.md.",
+    ),
+    Signal("protection_lever_reason", "", "protection", "Limit that changed the lever, by the same numbers."),
+    Signal("protection_nacelle_reason", "", "protection", "Limit that changed the nacelle rate, by the same numbers."),
+    Signal(
+        "time_to_limit_s",
+        "s",
+        "protection",
+        "Predicted time until the corridor is left with the controls as they are; 6 where not, or unwatched.",
+    ),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

@@ -1,8 +1,8 @@
 """One frame of the closed loop, compiled: observe, command, record, advance.
 
-``observe`` fills what can be known at the start of a frame, ``pilot_command`` asks the built-in MOCM, ``advance`` records
-the command and moves everything to the next frame. ``run_frames`` is the same three calls in a compiled loop, so that a
-flight stepped from Python and one run in a batch are equal bit for bit.
+``observe`` fills what can be known at the start of a frame, ``pilot_command`` asks the built-in MOCM, ``advance``
+passes the command through aids and protection, records it and moves everything to the next frame. ``run_frames`` is the
+same three calls in a compiled loop, so that a flight stepped from Python and one run in a batch are equal bit for bit.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from rtsim.faults.fault_kernels import (
     fault_actuators_end,
     fault_airspeed_error,
     fault_mask,
+    fault_nacelle_ok,
     fault_nacelle_rate,
     fault_update,
 )
@@ -42,6 +43,8 @@ from rtsim.nacelle.nacelle_kernels import (
     on_downstop,
 )
 from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance_in, mocm_engage, mocm_output_in
+from rtsim.protection import law_data as law
+from rtsim.protection.law_kernels import law_due, protect
 from rtsim.ramp_filter_kernels import critically_damped_ramp
 from rtsim.units import (
     DEGREE,
@@ -102,6 +105,8 @@ class SimulationTables(NamedTuple):
     """Parameters of gusts and turbulence."""
     faults: FaultTables
     """Failures and their times."""
+    protection: law.ProtectionTables
+    """The compiled protection law; it acts after the aids, on what would move the controls."""
     programme: FloatArray
     """Rows: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
     reference_frequency: float
@@ -131,6 +136,8 @@ class SimulationState(NamedTuple):
     """Turbulence filters, gusts that act or are to come, and what acts now."""
     faults: FloatArray
     """Which failures are active."""
+    protection: FloatArray
+    """State of the protection law."""
     clock: FloatArray
     """Frame number, pilot mode, distance flown [m], LPV flags, end code, sink rate at the end [m/s]."""
 
@@ -157,9 +164,9 @@ class Scratch(NamedTuple):
     target: FloatArray
     """What the pilot is asked for."""
     command: FloatArray
-    """Stick, lever, nacelle rate."""
+    """Stick, lever, nacelle rate that are to act."""
     hands: FloatArray
-    """Stick and lever after protection, before the aids."""
+    """The pilot's stick and lever, before the aids."""
     pilot: FloatArray
     """Work array of the pilot kernels."""
     asked: FloatArray
@@ -168,6 +175,12 @@ class Scratch(NamedTuple):
     """Where failed actuators stand after the frame."""
     gust: FloatArray
     """Gust of the next frame in body axes."""
+    sensors: FloatArray
+    """What the protection law may know."""
+    limited: FloatArray
+    """Stick, lever, nacelle rate as the law leaves them."""
+    law: FloatArray
+    """Work array of the law."""
 
 
 @inner_kernel
@@ -352,27 +365,15 @@ def _end_code(tables: SimulationTables, state: SimulationState) -> int:
 
 
 @inner_kernel
-def advance(
-    tables: SimulationTables,
-    state: SimulationState,
-    scratch: Scratch,
-    row: FloatArray,
-    commands: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
-) -> None:
-    """Record the command and move the whole simulation to the start of the next frame.
+def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, applied: FloatArray) -> None:
+    """Turn the pilot's command into what would act without protection: limited to the travel, with the aids.
 
     Args:
         tables: The simulation.
-        state: Its state, updated in place.
-        scratch: Work space as ``observe`` left it.
-        row: The frame row, completed.
-        commands: The pilot's command, the command that acts, and this frame's standard normals of the pilot and of the
-            air (empty where there is no noise and no turbulence).
+        state: Its state; the aids' part is updated.
+        scratch: Work space as ``observe`` left it; afterwards its ``command`` holds stick, lever, nacelle rate.
+        applied: The pilot's stick, lever, nacelle rate [rad/s].
     """
-    asked, applied, noise, air_noise = commands
-    dt = tables.dt
-    x, u = state.x, state.u
-    angle = scratch.motion[0]
     acting = scratch.command
     scratch.hands[0] = min(max(applied[0], -1.0), 1.0)
     scratch.hands[1] = min(max(applied[1], 0.0), 1.0)
@@ -381,10 +382,112 @@ def advance(
         # Whoever takes over later finds the aids to be engaged anew.
         state.aids[LAST_SWITCHES] = -1.0
     else:
-        acting[0], acting[1] = u[INPUT.stick], u[INPUT.lever]
+        acting[0], acting[1] = state.u[INPUT.stick], state.u[INPUT.lever]
+        angle, dt = scratch.motion[0], tables.dt
         aids_step(tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, acting, dt)
+    acting[2] = nacelle_assigned_rate(tables.nacelle, applied[2])
+
+
+@inner_kernel
+def sense(state: SimulationState, scratch: Scratch, row: FloatArray, sensors: FloatArray) -> None:
+    """Give what a protection law may know, the numbers of ``Simulation.sensors``.
+
+    Args:
+        state: The simulation's state.
+        scratch: Its work space as ``observe`` left it.
+        row: The frame's row as ``observe`` left it.
+        sensors: Written, shape (SENSOR_COUNT,), SI.
+    """
+    x = state.x
+    sensors[law.SENSE_TIME] = row[COLUMN.time_s]
+    sensors[law.SENSE_AIRSPEED] = row[COLUMN.airspeed_indicated_kt] * KNOT
+    sensors[law.SENSE_AIRSPEED_RATE] = row[COLUMN.airspeed_rate_kt_s] * KNOT
+    sensors[law.SENSE_NACELLE] = scratch.motion[0]
+    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[1]
+    sensors[law.SENSE_PITCH] = x[STATE.pitch]
+    sensors[law.SENSE_PITCH_RATE] = x[STATE.q]
+    sensors[law.SENSE_FLIGHT_PATH] = row[COLUMN.flight_path_deg] * DEGREE
+    sensors[law.SENSE_ALTITUDE] = x[STATE.altitude]
+    sensors[law.SENSE_CLIMB_RATE] = row[COLUMN.climb_rate_m_s]
+    sensors[law.SENSE_LOAD_FACTOR] = row[COLUMN.load_factor]
+    sensors[law.SENSE_TORQUE] = row[COLUMN.mast_torque_inlb] * INCH_POUND
+    sensors[law.SENSE_FLAPPING] = row[COLUMN.flapping_deg] * DEGREE
+    sensors[law.SENSE_DOWNSTOP] = row[COLUMN.on_downstop]
+    sensors[law.SENSE_NACELLE_OK] = 1.0 if fault_nacelle_ok(state.faults) else 0.0
+
+
+@inner_kernel
+def limit(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
+    """Let the compiled law limit what ``shape`` left in the work space's ``command``, and record what it did.
+
+    Args:
+        tables: The simulation.
+        state: Its state; the law's part is updated.
+        scratch: Work space as ``shape`` left it.
+        row: The frame's row; the columns of the protection are written.
+    """
+    acting, limited = scratch.command, scratch.limited
+    frame = int(state.clock[CLOCK_FRAME])
+    if law_due(tables.protection, state.protection, frame):
+        sense(state, scratch, row, scratch.sensors)
+    protect(tables.protection, state.protection, frame, scratch.sensors, acting, limited, scratch.law)
+    row[COLUMN.protection_stick] = limited[0] - acting[0]
+    row[COLUMN.protection_lever] = limited[1] - acting[1]
+    row[COLUMN.protection_nacelle_rate_deg_s] = (limited[2] - acting[2]) / DEGREE
+    row[COLUMN.protection_stick_reason] = state.protection[law.L_STICK_CAUSE]
+    row[COLUMN.protection_lever_reason] = state.protection[law.L_LEVER_CAUSE]
+    row[COLUMN.protection_nacelle_reason] = state.protection[law.L_RATE_CAUSE]
+    row[COLUMN.time_to_limit_s] = state.protection[law.L_TIME]
+    acting[0], acting[1], acting[2] = limited[0], limited[1], limited[2]
+
+
+@inner_kernel
+def advance(
+    tables: SimulationTables,
+    state: SimulationState,
+    scratch: Scratch,
+    row: FloatArray,
+    commands: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Aids, protection, and the rest of the frame: the whole simulation moves to the start of the next.
+
+    Args:
+        tables: The simulation.
+        state: Its state, updated in place.
+        scratch: Work space as ``observe`` left it.
+        row: The frame row, completed.
+        commands: The pilot's command, the command that goes to aids and law in its place, and this frame's standard
+            normals of the pilot and of the air (empty where there is no noise and no turbulence).
+    """
+    shape(tables, state, scratch, commands[1])
+    limit(tables, state, scratch, row)
+    complete(tables, state, scratch, row, (commands[0], commands[2], commands[3]))
+
+
+@inner_kernel
+def complete(
+    tables: SimulationTables,
+    state: SimulationState,
+    scratch: Scratch,
+    row: FloatArray,
+    commands: tuple[FloatArray, FloatArray, FloatArray],
+) -> None:
+    """Record the command and move the whole simulation to the start of the next frame.
+
+    Args:
+        tables: The simulation.
+        state: Its state, updated in place.
+        scratch: Work space as ``observe`` left it.
+        row: The frame row, completed.
+        commands: The pilot's command, and this frame's standard normals of the pilot and of the air.
+    """
+    asked, noise, air_noise = commands
+    dt = tables.dt
+    x, u = state.x, state.u
+    angle = scratch.motion[0]
+    acting = scratch.command
     stick, lever = acting[0], acting[1]
-    rate = fault_nacelle_rate(state.faults, nacelle_assigned_rate(tables.nacelle, applied[2]))
+    rate = fault_nacelle_rate(state.faults, acting[2])
     rate = nacelle_effective_rate(tables.nacelle, state.nacelle, rate, dt)
     margin = min(scratch.margins[0], scratch.margins[1])
     controls = tables.aircraft.controls

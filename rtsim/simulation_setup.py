@@ -26,6 +26,12 @@ from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme
+from rtsim.protection.boundary import BoundaryName
+from rtsim.protection.chain import compiled_law
+from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE
+from rtsim.protection.law_kernels import law_start
+from rtsim.protection.laws import load_laws
+from rtsim.protection.tables import law_tables
 from rtsim.units import to_deg, to_kt
 
 Plant = Literal["lpv", "lpv-plain", "nonlinear"]
@@ -68,6 +74,11 @@ class FlightSetup:
     """Gusts and turbulence."""
     faults: tuple[Fault, ...] = ()
     """Failures and their times."""
+    protection: str = "off"
+    """Protection laws in the order in which they act, separated by commas: ``off``, ``monitor``, ``governor``,
+    ``full``, ``MODULE:CLASS`` or an entry point."""
+    protection_boundary: BoundaryName = "flight"
+    """Corridor that the built-in laws keep to."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +147,13 @@ def build_parts(setup: FlightSetup) -> Parts:
         aids=design_aids(database),
         gusts=setup.air.tables(),
         faults=fault_tables(setup.faults),
+        # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
+        protection=law_tables(
+            compiled_law(load_laws(setup.protection)) or "monitor",
+            database,
+            dt=1.0 / setup.rate_hz,
+            boundary=setup.protection_boundary,
+        ),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         reference_frequency=REFERENCE_FREQUENCY,
     )
@@ -157,6 +175,9 @@ def build_parts(setup: FlightSetup) -> Parts:
         asked=np.zeros(3),
         planned=np.zeros(3),
         gust=np.zeros(3),
+        sensors=np.zeros(SENSOR_COUNT),
+        limited=np.zeros(3),
+        law=np.zeros(WORK_SIZE),
     )
     return Parts(
         tables=tables,
@@ -192,8 +213,10 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> ke
         switches=switches_of(setup.aids),
         gusts=new_gust_state(setup.air, air_normals),
         faults=new_fault_state(),
+        protection=np.zeros(LAW_STATE_SIZE),
         clock=clock,
     )
+    law_start(parts.tables.protection, state.protection)
     if setup.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
     kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))

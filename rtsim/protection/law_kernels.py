@@ -240,6 +240,18 @@ def _apply_hands(state: FloatArray, stick: float, lever: float, applied: FloatAr
 
 
 @inner_kernel
+def law_due(tables: ProtectionTables, state: FloatArray, frame: int) -> bool:
+    """Whether the law decides in this frame, and so reads the sensors.
+
+    Args:
+        tables: The law.
+        state: Law state.
+        frame: Number of the frame.
+    """
+    return tables.law != LAW_OFF and (frame % tables.every == 0 or state[L_STARTED] == 0.0)
+
+
+@inner_kernel
 def protect(
     tables: ProtectionTables,
     state: FloatArray,
@@ -260,6 +272,6 @@ def protect(
         applied: Written: the same with the law; may be the same array.
         work: Scratch of WORK_SIZE numbers.
     """
-    if tables.law != LAW_OFF and (frame % tables.every == 0 or state[L_STARTED] == 0.0):
+    if law_due(tables, state, frame):
         law_decide(tables, state, sensors, command, work)
     law_apply(tables, state, command, applied)
