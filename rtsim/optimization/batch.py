@@ -10,11 +10,12 @@ import dataclasses
 import math
 import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.atmosphere import normals_needed
+from rtsim.atmosphere.air import normals_needed
 from rtsim.frame import SIGNAL_COUNT
 from rtsim.optimization import merit_kernels as kernels
 from rtsim.optimization.figures import FlightFigures, figures_from_sums
@@ -73,10 +74,15 @@ class BatchFlyer:
         jobs = [flight if isinstance(flight, BatchFlight) else BatchFlight(flight) for flight in flights]
         if self.workers == 1 or len(jobs) < 2:
             return [self.fly_one(job) for job in jobs]
-        from joblib import Parallel, delayed
-
-        parallel = Parallel(n_jobs=min(self.workers, len(jobs)), backend="threading", batch_size=1)
-        return list(parallel(delayed(self.fly_one)(job) for job in jobs))
+        # Threads, not processes: the kernel runs outside Python's lock, the tables (tens of MB) are shared, and Ctrl-C
+        # only waits for the flights in the air.
+        with ThreadPoolExecutor(max_workers=min(self.workers, len(jobs))) as pool:
+            futures = [pool.submit(self.fly_one, job) for job in jobs]
+            try:
+                return [future.result() for future in futures]
+            except BaseException:
+                pool.shutdown(wait=True, cancel_futures=True)
+                raise
 
     def fly_one(self, flight: BatchFlight) -> FlightFigures:
         """Fly one in this thread.

@@ -1,0 +1,209 @@
+"""What a conversion-path search is asked to do: the TOML layout of its specification, checked."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rtsim.errors import InputError
+from rtsim.optimization.figures import OBJECTIVES
+from rtsim.optimization.path import AccelerationCaps
+from rtsim.optimization.paths import FAST_SIDE_CAPS, NEAR_STALL_CAPS, PATH_NAMES
+
+Objective = Literal[
+    "flapping_integral",
+    "flapping_peak",
+    "flapping_rms",
+    "stick_effort",
+    "lever_effort",
+    "stick_travel",
+    "duration",
+    "corridor_proximity",
+    "altitude_excursion",
+    "pitch_excursion",
+    "energy",
+]
+PathName = Literal["typical", "near_stall", "centre_line", "centre_line_variable", "fast_side"]
+Method = Literal["ga", "cma-es", "nsga2"]
+Handling = Literal["feasibility", "penalty"]
+LARGEST_SPEC_BYTES = 1_000_000
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Cap = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    """A table of the file: no unknown keys, read-only."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class AccelerationTable(_Strict):
+    """``[acceleration]``: caps by region; see :class:`rtsim.optimization.path.AccelerationCaps`."""
+
+    above_detent_kt_s: Cap = 3.0
+    below_detent_kt_s: Cap = 4.0
+    airplane_kt_s: Cap = 5.0
+    detent_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 50.0
+
+    def caps(self) -> AccelerationCaps:
+        """The caps as the paths take them."""
+        return AccelerationCaps(self.above_detent_kt_s, self.below_detent_kt_s, self.airplane_kt_s, self.detent_deg)
+
+
+class LimitsTable(_Strict):
+    """``[limits]``: what a path must keep to; each is a constraint of the search."""
+
+    margin_kt: Annotated[float, Field(ge=-20.0, le=60.0)] = 5.0
+    altitude_m: Positive = 4.5
+    pitch_deg: Positive = 18.0
+    airspeed_error_kt: Positive = 4.0
+    flapping_deg: Positive = 7.0
+    duration_s: Positive | None = None
+    mast_torque_inlb: Positive | None = None
+
+
+class SearchTable(_Strict):
+    """``[search]``: how to look for it."""
+
+    method: Method = "cma-es"
+    generations: Annotated[int, Field(ge=1, le=100_000)] = 40
+    population: Annotated[int, Field(ge=4, le=10_000)] = 32
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    handling: Handling = "feasibility"
+    start_from: list[PathName] = ["typical", "near_stall", "centre_line", "centre_line_variable", "fast_side"]
+
+
+class FlightTable(_Strict):
+    """``[flight]``: what flies."""
+
+    plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
+    outer_loop: Literal["integrators", "pi"] = "integrators"
+    corridor: Literal["design", "flight"] = "design"
+    rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
+    altitude_m: Annotated[float, Field(ge=10.0, le=10_000.0)] = 100.0
+
+
+class RobustTable(_Strict):
+    """``[robust]``: judge each path by several flights in turbulence, all candidates meeting the same air."""
+
+    flights: Annotated[int, Field(ge=0, le=1000)] = 0
+    turbulence: Literal["light", "moderate", "severe"] | None = "moderate"
+    pilot_noise: bool = True
+    spread_weight: Annotated[float, Field(ge=0.0, le=10.0)] = 1.0
+    altitude_m: Positive = 15.0
+    pitch_deg: Positive = 25.0
+    airspeed_error_kt: Positive = 25.0
+    margin_kt: Annotated[float, Field(ge=-20.0, le=60.0)] = 0.0
+    flapping_deg: Positive = 10.0
+
+
+class SearchSpec(_Strict):
+    """A whole specification."""
+
+    format: Literal[1] = 1
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=80)] = "best_conversion"
+    objectives: Annotated[list[Objective], Field(min_length=1, max_length=4)] = ["flapping_integral"]
+    points: Annotated[int, Field(ge=1, le=30)] = 7
+    nacelle_rate_deg_s: Annotated[float, Field(ge=0.1, le=12.0)] = 3.0
+    nacelle_motion: Literal["rate", "spread"] = "rate"
+    hold_s: Annotated[float, Field(ge=0.0, le=60.0)] = 4.0
+    acceleration: AccelerationTable = AccelerationTable()
+    limits: LimitsTable = LimitsTable()
+    search: SearchTable = SearchTable()
+    flight: FlightTable = FlightTable()
+    robust: RobustTable = RobustTable()
+
+
+def spec_like(path: str) -> SearchSpec:
+    """The constraint set of one of the paper's paths: its nacelle rate, its motion and its acceleration caps.
+
+    Args:
+        path: One of ``rtsim.optimization.paths.PATH_NAMES``.
+
+    Raises:
+        InputError: There is no such path.
+    """
+    if path not in PATH_NAMES:
+        raise InputError("is not a path", key="--like", value=path, allowed=", ".join(PATH_NAMES))
+    caps = {"near_stall": NEAR_STALL_CAPS, "fast_side": FAST_SIDE_CAPS}.get(path, AccelerationCaps())
+    rate, motion = 3.0, "rate" if path == "typical" else "spread"
+    if path == "centre_line_variable":
+        rate, caps = 12.0, AccelerationCaps(4.0, 4.0, 5.0)
+    return SearchSpec.model_validate(
+        {
+            "name": f"best_like_{path}",
+            "nacelle_rate_deg_s": rate,
+            "nacelle_motion": motion,
+            "acceleration": {
+                "above_detent_kt_s": caps.above_detent_kt_s,
+                "below_detent_kt_s": caps.below_detent_kt_s,
+                "airplane_kt_s": caps.airplane_kt_s,
+            },
+        }
+    )
+
+
+def load_spec(path: str | Path) -> SearchSpec:
+    """Read a specification file.
+
+    Args:
+        path: The TOML file.
+
+    Raises:
+        InputError: It does not exist, is no TOML, or has a key or value that is not allowed (the first one found).
+    """
+    file = Path(path)
+    try:
+        if file.stat().st_size > LARGEST_SPEC_BYTES:
+            raise InputError("is too large for a specification", file=str(path))
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError("does not exist", file=str(path), mend="check the path") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"is not valid TOML: {error}", file=str(path), mend="correct this line") from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+    return checked_spec(data, file=str(path))
+
+
+def checked_spec(data: dict[str, Any], *, file: str | None = None) -> SearchSpec:
+    """Check the content of a specification.
+
+    Args:
+        data: The tables.
+        file: Where they came from, for messages.
+
+    Raises:
+        InputError: A key or value is not allowed; the first one found.
+    """
+    try:
+        spec = SearchSpec.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(part) for part in first["loc"])
+        unknown = first["type"] == "extra_forbidden"
+        raise InputError(
+            "is not a key of a search specification" if unknown else str(first["msg"]).lower(),
+            file=file,
+            key=key,
+            value=None if unknown or first["type"] == "missing" else first["input"],
+            mend="see docs/optimization.md",
+        ) from None
+    if len(set(spec.objectives)) != len(spec.objectives):
+        raise InputError("names an objective twice", file=file, key="objectives", value=list(spec.objectives))
+    if len(spec.objectives) > 1 and spec.search.method != "nsga2":
+        raise InputError(
+            "cannot minimize several objectives at once",
+            file=file,
+            key="search.method",
+            value=spec.search.method,
+            allowed="nsga2",
+            mend="choose nsga2 or one objective",
+        )
+    return spec
+
+
+assert set(OBJECTIVES) == set(Objective.__args__), "the literal and the table of objectives differ"  # type: ignore[attr-defined]
