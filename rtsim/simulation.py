@@ -18,6 +18,9 @@ from rtsim.faults import Fault
 from rtsim.faults.fault_kernels import fault_apply, fault_nacelle_ok
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.programme import Programme
+from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
+from rtsim.protection.law_data import L_OVERRIDE
+from rtsim.protection.laws import load_laws
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
 from rtsim.units import DEGREE, INCH_POUND, KNOT
@@ -50,6 +53,8 @@ class Snapshot:
     """Copies of every array the frame changes."""
     random_stream: dict[str, object]
     """State of the generators of pilot noise and turbulence, and the noise drawn for this frame."""
+    laws: ChainSnapshot | None = None
+    """State of the protection laws written in Python; None where there is none."""
 
 
 class Simulation:
@@ -80,6 +85,9 @@ class Simulation:
         self._applied = np.zeros(3)
         self._observed = False
         self._noise = np.zeros(self._noise_width)
+        laws = load_laws(setup.protection, boundary=setup.protection_boundary)
+        self.laws = LawChain(laws, dt=self.tables.dt) if compiled_law(laws) is None else None
+        """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
 
     @property
     def dt(self) -> float:
@@ -143,6 +151,8 @@ class Simulation:
         fresh = start_state(self.setup, self._parts, self._air_random.standard_normal(3))
         for mine, start in zip(self._state, fresh, strict=True):
             mine[:] = start
+        if self.laws is not None:
+            self.laws.reset()
         self._observed = False
 
     def sensors(self) -> Sensors:
@@ -203,7 +213,7 @@ class Simulation:
         Returns:
             The frame's row, shape (SIGNAL_COUNT,), a new array.
         """
-        if command is None and applied is None and not self._observed:
+        if command is None and applied is None and not self._observed and self.laws is None:
             # One call instead of three: handing the tables over costs more than the frame itself.
             if self._noise_width:
                 self._noise[:] = self._random.standard_normal(self._noise_width)
@@ -230,18 +240,15 @@ class Simulation:
                 value=tuple(float(v) for v in self._applied),
                 mend="give stick, lever and nacelle rate as finite numbers",
             )
-        kernels.advance(
-            self.tables,
-            self._state,
-            self._scratch,
-            self._row,
-            (
-                self._command,
-                self._applied,
-                self._noise,
-                self._air_random.standard_normal(normals_needed(self._state.gusts)),
-            ),
-        )
+        air_noise = self._air_random.standard_normal(normals_needed(self._state.gusts))
+        parts = (self.tables, self._state, self._scratch, self._row)
+        if self.laws is None:
+            kernels.advance(*parts, (self._command, self._applied, self._noise, air_noise))
+        else:
+            kernels.shape(self.tables, self._state, self._scratch, self._applied)
+            kernels.limit(*parts)
+            self._limit_in_python(self.laws)
+            kernels.complete(*parts, (self._command, self._noise, air_noise))
         self._observed = False
         return self._row.copy()
 
@@ -255,6 +262,12 @@ class Simulation:
             The rows, shape (frames flown, SIGNAL_COUNT).
         """
         rows = np.zeros((frames, SIGNAL_COUNT))
+        if self.laws is not None:
+            flown = 0
+            while flown < frames and not self.finished:
+                rows[flown] = self.step()
+                flown += 1
+            return rows[:flown]
         noise = np.zeros((frames, self._noise_width))
         if self._noise_width and frames:
             # The noise of an already observed frame is drawn; the rest follows in the same order as by step.
@@ -335,6 +348,40 @@ class Simulation:
         """
         set_turbulence(self._state.gusts, turbulence, self._air_random.standard_normal(3))
 
+    def set_protection_override(self, on: bool) -> None:
+        """Take the authority from the protection, or give it back, from this frame on; it goes on watching.
+
+        Args:
+            on: The pilot overrides.
+        """
+        self._state.protection[L_OVERRIDE] = 1.0 if on else 0.0
+
+    @property
+    def protection_overridden(self) -> bool:
+        """Whether the pilot has taken the authority from the protection."""
+        return float(self._state.protection[L_OVERRIDE]) != 0.0
+
+    def _limit_in_python(self, laws: LawChain) -> None:
+        """Let the laws in Python limit what is to act, and record what they changed."""
+        acting = self._scratch.command
+        stick, lever, rate = (float(value) for value in acting)
+        command = Command(stick, lever, rate)
+        if laws.due(self.frame_index):
+            laws.decide(self.frame_index, self.sensors(), command, self.margins())
+        if self.protection_overridden:
+            return
+        limited = laws.apply(command)
+        if limited is command:
+            return
+        acting[:] = limited.stick, limited.lever, limited.nacelle_rate
+        row, reasons = self._row, laws.reasons
+        row[COLUMN.protection_stick] = limited.stick - stick
+        row[COLUMN.protection_lever] = limited.lever - lever
+        row[COLUMN.protection_nacelle_rate_deg_s] = (limited.nacelle_rate - rate) / DEGREE
+        row[COLUMN.protection_stick_reason] = reasons[0]
+        row[COLUMN.protection_lever_reason] = reasons[1]
+        row[COLUMN.protection_nacelle_reason] = reasons[2]
+
     def snapshot(self) -> Snapshot:
         """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""
         self._observe()
@@ -343,7 +390,8 @@ class Simulation:
             "drawn": self._noise.copy(),
             "air": self._air_random.bit_generator.state,
         }
-        return Snapshot(kernels.SimulationState(*(array.copy() for array in self._state)), noise_state)
+        laws = self.laws.snapshot() if self.laws is not None else None
+        return Snapshot(kernels.SimulationState(*(array.copy() for array in self._state)), noise_state, laws)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot; what follows is bit-equal to what followed it the first time.
@@ -356,6 +404,8 @@ class Simulation:
         self._random.bit_generator.state = snapshot.random_stream["generator"]
         self._air_random.bit_generator.state = snapshot.random_stream["air"]
         self._noise[:] = np.asarray(snapshot.random_stream["drawn"])
+        if self.laws is not None and snapshot.laws is not None:
+            self.laws.restore(snapshot.laws)
         kernels.observe(self.tables, self._state, self._scratch, self._row)
         self._observed = True
 

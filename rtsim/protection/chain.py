@@ -6,20 +6,24 @@ left as it was follows the pilot in every frame; one that it changed keeps the l
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.errors import InputError
 from rtsim.protection.guard import Failure, GuardedAnswer, guarded_call
-from rtsim.protection.laws import LawSpec
-from rtsim.protection.limits import frames_per_decision
+from rtsim.protection.laws import CHANNELS, LawSpec
+from rtsim.protection.limits import LIMIT_KINDS, frames_per_decision
 
 BATCH_LIMIT = 1.0
 """Wall time of one call after which a law is ended in a batch [s]."""
 LIVE_LIMIT = 0.25
 """The same in a live flight, where the loop waits meanwhile [s]."""
+OTHER_REASON = float(len(LIMIT_KINDS) + 1)
+"""Recorded reason of an intervention whose limit is none of ``LIMIT_KINDS``."""
 EventKind = Literal["raised", "not_finite", "wrong_answer", "interrupted", "skipped", "global_state"]
 
 
@@ -49,6 +53,22 @@ class ChainedIntervention:
     """Name of the law."""
     intervention: Intervention
     """What it did."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChainSnapshot:
+    """All state of a chain; the laws are deep copies."""
+
+    laws: tuple[ProtectionLaw | None, ...]
+    """The laws; None where one has ended."""
+    waiting: tuple[int, ...]
+    """Calls still to be skipped."""
+    held: tuple[float | None, ...]
+    """Limited values held until the next decision."""
+    reasons: tuple[float, ...]
+    """Their reasons."""
+    calls: tuple[int, ...]
+    """Calls remembered so far."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +116,58 @@ class LawChain:
         """What happened besides limiting."""
         self.interventions: tuple[ChainedIntervention, ...] = ()
         """What the laws say they did in the last decision."""
+        self.live, self.on_event, self.remember = live, on_event, remember
+        self.reasons: tuple[float, ...] = (0.0, 0.0, 0.0)
+        """Number of the limit that changed stick, lever and nacelle rate; ``OTHER_REASON`` for a law's own limits."""
         self._specs = tuple(laws)
-        self._laws: list[ProtectionLaw | None] = [spec.make() for spec in laws]
-        self._live, self._on_event, self._remember = live, on_event, remember
         self._skip, self._end = frozenset(skip), frozenset(end)
-        self._waiting = [0] * len(self._specs)
-        self._calls: list[list[_Call]] = [[] for _ in self._specs]
+        self._laws: list[ProtectionLaw | None] = []
+        self._waiting: list[int] = []
+        self._calls: list[list[_Call]] = []
         self._held: list[float | None] = [None, None, None]
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a flight: a fresh instance of every law, nothing held."""
+        self._laws = [spec.make() for spec in self._specs]
+        self._waiting = [0] * len(self._specs)
+        self._calls = [[] for _ in self._specs]
+        self._held = [None, None, None]
+        self.interventions, self.reasons = (), (0.0, 0.0, 0.0)
+
+    def snapshot(self) -> ChainSnapshot:
+        """Copy all state.
+
+        Raises:
+            InputError: A law cannot be copied.
+        """
+        calls = tuple(len(calls) for calls in self._calls)
+        return ChainSnapshot(self._copied(self._laws), tuple(self._waiting), tuple(self._held), self.reasons, calls)
+
+    def restore(self, snapshot: ChainSnapshot) -> None:
+        """Go back to a snapshot.
+
+        Args:
+            snapshot: From ``snapshot`` of a chain of the same laws.
+        """
+        self._laws = list(self._copied(snapshot.laws))
+        self._waiting, self._held, self.reasons = list(snapshot.waiting), list(snapshot.held), snapshot.reasons
+        for calls, count in zip(self._calls, snapshot.calls, strict=True):
+            del calls[count:]
+
+    def _copied(self, laws: Sequence[ProtectionLaw | None]) -> tuple[ProtectionLaw | None, ...]:
+        copies = []
+        for law, spec in zip(laws, self._specs, strict=True):
+            try:
+                copies.append(copy.deepcopy(law))
+            except Exception as error:
+                raise InputError(
+                    f"the law cannot be copied: {type(error).__name__}: {error}",
+                    key="protection",
+                    value=spec.name,
+                    mend="keep plain values, arrays and objects that copy.deepcopy can copy",
+                ) from error
+        return tuple(copies)
 
     def due(self, frame: int) -> bool:
         """Whether the laws decide in this frame, and so need sensors and margins.
@@ -132,6 +197,10 @@ class LawChain:
         self.interventions = tuple(noted)
         pairs = zip(_values(command), _values(limited), strict=True)
         self._held = [None if after == before else after for before, after in pairs]
+        self.reasons = tuple(
+            _reason(channel, noted) if held is not None else 0.0
+            for channel, held in zip(CHANNELS, self._held, strict=True)
+        )
 
     def apply(self, command: Command) -> Command:
         """Limit this frame's command by what was decided last.
@@ -188,15 +257,15 @@ class LawChain:
             text = f"the law {name} was skipped: its last call took too long"
             self._tell(LawEvent(frame, name, "skipped", text, False))
             return None
-        limit = LIVE_LIMIT if self._live else BATCH_LIMIT
+        limit = LIVE_LIMIT if self.live else BATCH_LIMIT
         answer = guarded_call(law, sensors, command, margins, dt=self.period, limit=limit)
         if answer.failure is not None:
             self._laws[place] = None
             self._fail(frame, name, answer.failure, answer.text)
             return None
-        if self._live and answer.duration > self.period:
+        if self.live and answer.duration > self.period:
             self._waiting[place] = math.ceil(answer.duration / self.period) - 1
-        if self._remember and answer.command is not None:
+        if self.remember and answer.command is not None:
             self._calls[place].append(_Call(sensors, command, margins, answer.command))
         return answer
 
@@ -206,8 +275,16 @@ class LawChain:
 
     def _tell(self, event: LawEvent) -> None:
         self.events.append(event)
-        if self._on_event is not None:
-            self._on_event(event)
+        if self.on_event is not None:
+            self.on_event(event)
+
+
+def _reason(channel: str, noted: Sequence[ChainedIntervention]) -> float:
+    """Number of the limit that had the last word on a channel."""
+    limits = [item.intervention.limit for item in noted if item.intervention.channel == channel]
+    if not limits or limits[-1] not in LIMIT_KINDS:
+        return OTHER_REASON
+    return 1.0 + LIMIT_KINDS.index(limits[-1])
 
 
 def _values(command: Command) -> tuple[float, float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 import importlib
 import math
@@ -66,6 +67,17 @@ class BuiltInLaw:
         self._work = np.zeros(data.WORK_SIZE)
         self._applied = np.zeros(3)
         law_kernels.law_start(self._tables, self._state)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> BuiltInLaw:
+        """Copy what changes in flight and share what is read-only.
+
+        Args:
+            memo: Not used: nothing that is copied refers to anything else.
+        """
+        del memo
+        twin = copy.copy(self)
+        twin._state, twin._work, twin._applied = self._state.copy(), self._work.copy(), self._applied.copy()
+        return twin
 
     @property
     def time_to_limit(self) -> float:
