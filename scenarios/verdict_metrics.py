@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+import numpy.typing as npt
+
 from rtsim.frame import FloatArray
 from scenarios.campaign import trial_kernels as kernels
+
+BoolArray = npt.NDArray[np.bool_]
 
 Flight = Literal["law", "off", "difference"]
 """Whose value a clause bounds: the protected flight's, its unprotected twin's, or the first minus the second."""
@@ -74,7 +79,7 @@ class TrialMetrics(Mapping[str, float]):
         """
         return float(self.values[METRIC_PLACE[name]])
 
-    def __iter__(self):  # type: ignore[no-untyped-def]  # a mapping's iterator
+    def __iter__(self) -> Iterator[str]:
         return iter(TRIAL_METRICS)
 
     def __len__(self) -> int:
@@ -83,20 +88,33 @@ class TrialMetrics(Mapping[str, float]):
     @property
     def exceeded(self) -> frozenset[str]:
         """What the flight violated, out of ``LEAVABLE``."""
-        found = {
-            "corridor": self["exceedances"] > 0.0,
-            "flapping": self["flapping_over_s"] > 0.0,
-            "torque": self["torque_over_s"] > 0.0,
-            "load_factor": self["load_factor_max"] > LOAD_FACTOR_RANGE[1]
-            or self["load_factor_min"] < LOAD_FACTOR_RANGE[0],
-            "pitch": self["pitch_peak_deg"] > PITCH_LIMIT_DEG,
-            "control": self["completed"] == 0.0,
-            "height": self["height_lost_m"] > VACUOUS_HEIGHT,
-        }
-        return frozenset(name for name, violated in found.items() if violated)
+        found = violations(self.values[None, :])
+        return frozenset(name for name, violated in found.items() if violated[0])
 
 
 LOAD_FACTOR_RANGE = (-0.5, 3.0)
 """Load factors that are allowed (rtsim/protection/data/protection.toml) [-]."""
 PITCH_LIMIT_DEG = 25.0
 """Pitch attitude that is allowed, either way (the same file) [deg]."""
+
+
+def violations(values: FloatArray) -> dict[str, BoolArray]:
+    """What flights violated, by name out of ``LEAVABLE``, shape (flights,) each.
+
+    Args:
+        values: Metrics, shape (flights, METRIC_COUNT).
+    """
+
+    def column(name: str) -> FloatArray:
+        return values[:, METRIC_PLACE[name]]
+
+    return {
+        "corridor": column("exceedances") > 0.0,
+        "flapping": column("flapping_over_s") > 0.0,
+        "torque": column("torque_over_s") > 0.0,
+        "load_factor": (column("load_factor_max") > LOAD_FACTOR_RANGE[1])
+        | (column("load_factor_min") < LOAD_FACTOR_RANGE[0]),
+        "pitch": column("pitch_peak_deg") > PITCH_LIMIT_DEG,
+        "control": column("completed") == 0.0,
+        "height": column("height_lost_m") > VACUOUS_HEIGHT,
+    }

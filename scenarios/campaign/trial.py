@@ -12,12 +12,14 @@ import numpy as np
 
 from rtsim import simulation_kernels as simulation
 from rtsim.aircraft.signals import STATE
-from rtsim.atmosphere import AirSpecification, normals_needed
+from rtsim.atmosphere import AirSpecification
+from rtsim.atmosphere.air import gust_tables, normals_needed
 from rtsim.errors import InputError
-from rtsim.faults import Fault, fault_tables
+from rtsim.faults import Fault
+from rtsim.faults.schedule import fault_tables
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from rtsim.programme import Programme, ProgrammePoint
-from rtsim.protection import law_data, law_kernels
+from rtsim.protection import law_data
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import load_limits
@@ -73,8 +75,6 @@ class TrialFlight:
     """Why it ended by itself, or empty."""
     rows: FloatArray
     """Frame history; a view that the next flight of the same bench overwrites unless it was asked to be kept."""
-    actions: FloatArray
-    """What the law changed, frame by frame; the same holds."""
     law_problems: tuple[str, ...] = ()
     """What went wrong in laws written in Python, as sentences."""
 
@@ -105,15 +105,8 @@ class Bench:
         self._parts: dict[tuple[str, bool], Parts] = {}
         self._laws: dict[tuple[str, float], law_data.ProtectionTables] = {}
         self._rows = np.zeros((0, SIGNAL_COUNT))
-        self._actions = np.zeros((0, kernels.ACTION_SIZE))
         limits = load_limits()
         self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
-        self._work = (
-            np.zeros(law_data.SENSOR_COUNT),
-            np.zeros(law_data.WORK_SIZE),
-            np.zeros(3),
-            np.zeros(3),
-        )
 
     @property
     def dt(self) -> float:
@@ -171,51 +164,43 @@ class Bench:
         """
         from scenarios.campaign.python_trial import fly_in_python
 
-        flying = self._prepare(plan, external=pilot is not None)
         name = law if isinstance(law, str) else compiled_law(law)
+        # Laws in Python stand in the compiled law's place.
+        tables = self.law("off" if name is None else name, buffer=buffer)
+        flying = self._prepare(plan, tables, external=pilot is not None)
         problems: tuple[str, ...] = ()
-        if name is not None and pilot is None:
-            flown = self._fly_compiled(flying, self.law(name, buffer=buffer))
-        elif name is not None:
-            flown = fly_in_python(flying, self.law(name, buffer=buffer), pilot, self._work)
+        if name is not None:
+            flown = self._fly_compiled(flying) if pilot is None else fly_in_python(flying, None, pilot)
         else:
             assert not isinstance(law, str)  # a name is a compiled law
             chain = LawChain(law, dt=self.dt, remember=repeat)
-            flown = fly_in_python(flying, chain, pilot, self._work)
+            flown = fly_in_python(flying, chain, pilot)
             if repeat:
                 chain.unrepeatable()
             problems = tuple(event.text for event in chain.events)
         metrics = np.zeros(kernels.METRIC_COUNT)
-        rows, actions = flying.rows[:flown], flying.actions[:flown]
-        kernels.measure_trial(rows, actions, flying.tables.programme, self._limits, self.dt, metrics)
+        rows = flying.rows[:flown]
+        kernels.measure_trial(rows, flying.tables.programme, self._limits, self.dt, metrics)
         ended = int(flying.state.clock[simulation.CLOCK_END])
         metrics[kernels.M_COMPLETED] = float(ended == simulation.END_NONE)
         metrics[kernels.M_YIELDED] = flying.script_state[script_kernels.S_YIELDED]
         reason = END_REASONS[ended].format(sink=float(flying.state.clock[simulation.CLOCK_SINK]))
-        if keep:
-            rows, actions = rows.copy(), actions.copy()
-        return TrialFlight(TrialMetrics(metrics), reason, rows, actions, problems)
+        return TrialFlight(TrialMetrics(metrics), reason, rows.copy() if keep else rows, problems)
 
-    def _fly_compiled(self, flying: Flying, law: law_data.ProtectionTables) -> int:
-        law_state = np.zeros(law_data.LAW_STATE_SIZE)
-        law_kernels.law_start(law, law_state)
+    def _fly_compiled(self, flying: Flying) -> int:
         return int(
             kernels.fly_trial(
                 flying.tables,
-                law,
                 flying.state,
-                law_state,
                 flying.scratch,
                 (flying.pulses, flying.script_state),
                 flying.reaction,
                 flying.noise,
-                self._work,
                 flying.rows,
-                flying.actions,
             )
         )
 
-    def _prepare(self, plan: FlightPlan, *, external: bool) -> Flying:
+    def _prepare(self, plan: FlightPlan, law: law_data.ProtectionTables, *, external: bool) -> Flying:
         """Put the aircraft at the plan's start and draw its random numbers."""
         frames = max(1, int(np.ceil(plan.duration * self.rate_hz - 1e-6)))
         setup = FlightSetup(
@@ -234,7 +219,7 @@ class Bench:
             air=plan.air,
             faults=plan.faults,
         )
-        parts = self._parts_of(setup)
+        parts = self._parts_of(setup, law)
         pilot_random = stream_generator(plan.seed, STREAM_PILOT)
         air_random = stream_generator(plan.seed, STREAM_TURBULENCE)
         state = start_state(setup, parts, air_random.standard_normal(3))
@@ -242,7 +227,6 @@ class Bench:
         script_kernels.script_start(script_state)
         if len(self._rows) < frames:
             self._rows = np.zeros((frames, SIGNAL_COUNT))
-            self._actions = np.zeros((frames, kernels.ACTION_SIZE))
         return Flying(
             tables=parts.tables,
             state=state,
@@ -255,11 +239,10 @@ class Bench:
                 air_random.standard_normal((frames, normals_needed(state.gusts))),
             ),
             rows=self._rows[:frames],
-            actions=self._actions[:frames],
             programme=plan.programme,
         )
 
-    def _parts_of(self, setup: FlightSetup) -> Parts:
+    def _parts_of(self, setup: FlightSetup, law: law_data.ProtectionTables) -> Parts:
         """Tables of a flight: the costly ones are loaded once and shared, the start is trimmed anew."""
         key = (setup.outer_loop, setup.pilot_noise)
         if key not in self._parts:
@@ -273,7 +256,11 @@ class Bench:
         programme = setup.programme
         points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
         tables = parts.tables._replace(
-            wind=float(setup.wind), gusts=setup.air.tables(), faults=fault_tables(setup.faults), programme=points
+            wind=float(setup.wind),
+            gusts=gust_tables(setup.air),
+            faults=fault_tables(setup.faults),
+            protection=law,
+            programme=points,
         )
         return dataclasses.replace(parts, tables=tables, start_x=x, start_u=u)
 
@@ -298,8 +285,6 @@ class Flying:
     """Standard normals of pilot and air."""
     rows: FloatArray
     """To be written: frame rows."""
-    actions: FloatArray
-    """To be written: what the law changes."""
     programme: Programme
     """What the pilot is asked to do."""
 
@@ -324,3 +309,18 @@ def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, Fl
             mend="start inside the conversion corridor (rtsim corridor shows it)",
         )
     return x.copy(), u.copy()
+
+
+def has_trim(plant: Plant, airspeed: float, nacelle: float) -> bool:
+    """Whether a flight can start somewhere.
+
+    Args:
+        plant: Aircraft model.
+        airspeed: Airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+    """
+    try:
+        _trim(plant, airspeed, nacelle)
+    except InputError:
+        return False
+    return True

@@ -1,6 +1,6 @@
 """One trial flight in one compiled call: aircraft, pilot, script and protection law, and what it is judged by.
 
-The frame is that of ``rtsim.simulation_kernels``; between the pilot and the aircraft stand the script and the law.
+The frame is that of ``rtsim.simulation_kernels``; between the pilot and the aircraft stands the script.
 """
 
 from __future__ import annotations
@@ -8,12 +8,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.aircraft.signals import INPUT, STATE
+from rtsim.aircraft.signals import INPUT
 from rtsim.compiled import inner_kernel
-from rtsim.faults.fault_kernels import fault_nacelle_ok
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.protection import law_data as law
-from rtsim.protection.law_kernels import protect
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.simulation_kernels import (
     CLOCK_END,
@@ -29,14 +27,7 @@ from rtsim.simulation_kernels import (
     pilot_command,
 )
 from rtsim.units import DEGREE, INCH_POUND, KNOT
-from scenarios.script_kernels import S_YIELDED, script_command, script_notice
-
-# Places in a row of actions: what the law changed in a frame, and why.
-A_STICK, A_LEVER, A_RATE, A_STICK_REASON, A_LEVER_REASON, A_RATE_REASON = 0, 1, 2, 3, 4, 5
-"""Limited minus asked: stick, lever, nacelle rate [rad/s]; reasons as in ``rtsim.protection.law_kernels``."""
-A_TIME = 6
-"""Predicted time to the corridor's boundary [s]."""
-ACTION_SIZE = 7
+from scenarios.script_kernels import script_command, script_notice
 
 WARNING_MARGIN = 4.0
 """Corridor margin at which the monitor warns and a pilot who yields begins to react [kn]."""
@@ -69,34 +60,6 @@ class TrialLimits(NamedTuple):
 
 
 @inner_kernel
-def fill_sensors(row: FloatArray, state: SimulationState, scratch: Scratch, sensors: FloatArray) -> None:
-    """Give what a law may know at the start of a frame, the numbers of ``Simulation.sensors``.
-
-    Args:
-        row: The frame's row as ``observe`` left it.
-        state: The simulation's state.
-        scratch: Its work space as ``observe`` left it.
-        sensors: Written, shape (SENSOR_COUNT,), SI.
-    """
-    x = state.x
-    sensors[law.SENSE_TIME] = row[COLUMN.time_s]
-    sensors[law.SENSE_AIRSPEED] = row[COLUMN.airspeed_indicated_kt] * KNOT
-    sensors[law.SENSE_AIRSPEED_RATE] = row[COLUMN.airspeed_rate_kt_s] * KNOT
-    sensors[law.SENSE_NACELLE] = scratch.motion[0]
-    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[1]
-    sensors[law.SENSE_PITCH] = x[STATE.pitch]
-    sensors[law.SENSE_PITCH_RATE] = x[STATE.q]
-    sensors[law.SENSE_FLIGHT_PATH] = row[COLUMN.flight_path_deg] * DEGREE
-    sensors[law.SENSE_ALTITUDE] = x[STATE.altitude]
-    sensors[law.SENSE_CLIMB_RATE] = row[COLUMN.climb_rate_m_s]
-    sensors[law.SENSE_LOAD_FACTOR] = row[COLUMN.load_factor]
-    sensors[law.SENSE_TORQUE] = row[COLUMN.mast_torque_inlb] * INCH_POUND
-    sensors[law.SENSE_FLAPPING] = row[COLUMN.flapping_deg] * DEGREE
-    sensors[law.SENSE_DOWNSTOP] = row[COLUMN.on_downstop]
-    sensors[law.SENSE_NACELLE_OK] = 1.0 if fault_nacelle_ok(state.faults) else 0.0
-
-
-@inner_kernel
 def ask_pilot(
     tables: SimulationTables,
     state: SimulationState,
@@ -126,81 +89,65 @@ def ask_pilot(
 
 
 @inner_kernel
-def finish_frame(
+def take_notice(
     tables: SimulationTables,
     state: SimulationState,
     scratch: Scratch,
     row: FloatArray,
-    commands: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     script: tuple[FloatArray, FloatArray],
     reaction: float,
 ) -> None:
-    """Move to the next frame, and let a pilot who yields take notice of what he was shown in this one.
+    """Let a pilot who yields take notice of what he was shown and felt in the frame that is over.
 
     Args:
         tables: The simulation.
-        state: Its state.
-        scratch: Its work space.
-        row: The frame's row, completed.
-        commands: What was asked, what acts, noise of pilot and air.
+        state: Its state at the start of the next frame.
+        scratch: Its work space as the frame left it.
+        row: The row of the frame that is over.
         script: Pulses and script state.
         reaction: Reaction time of a pilot who yields [s], negative for one who does not.
     """
+    if reaction < 0.0:
+        return
     warned = min(scratch.shown[1], scratch.shown[2]) < WARNING_MARGIN * KNOT
-    for k in range(3):
-        warned = warned or commands[0][k] != commands[1][k]
-    shown = scratch.shown[0]
-    advance(tables, state, scratch, row, commands)
-    script_notice(script[1], reaction, state.clock[CLOCK_FRAME] * tables.dt, warned, shown, state.reference)
+    warned = warned or row[COLUMN.protection_stick_reason] != 0.0
+    warned = warned or row[COLUMN.protection_lever_reason] != 0.0
+    warned = warned or row[COLUMN.protection_nacelle_reason] != 0.0
+    time = state.clock[CLOCK_FRAME] * tables.dt
+    script_notice(script[1], reaction, time, warned, scratch.shown[0], state.reference)
 
 
 @inner_kernel
 def fly_trial(
     tables: SimulationTables,
-    protection: law.ProtectionTables,
     state: SimulationState,
-    law_state: FloatArray,
     scratch: Scratch,
     script: tuple[FloatArray, FloatArray],
     reaction: float,
     noise: tuple[FloatArray, FloatArray],
-    work: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     rows: FloatArray,
-    actions: FloatArray,
 ) -> int:
     """Fly until the rows are full or the flight ends.
 
     Args:
-        tables: The simulation.
-        protection: The law.
+        tables: The simulation, its law included.
         state: Simulation state, updated in place.
-        law_state: Law state, started.
         scratch: Work space of the simulation.
         script: Pulses and script state.
         reaction: Reaction time of a pilot who yields [s], negative for one who does not.
         noise: Standard normals of pilot and air, one row per frame.
-        work: Sensors, law's work space, command, limited command.
         rows: Written: frame rows.
-        actions: Written: what the law changed, shape (frames, ACTION_SIZE).
 
     Returns:
         Frames flown.
     """
-    sensors, law_work, command, applied = work
+    command = scratch.asked
     for k in range(rows.shape[0]):
         if state.clock[CLOCK_END] != END_NONE:
             return k
-        row, action = rows[k], actions[k]
-        ask_pilot(tables, state, scratch, row, script, command)
-        fill_sensors(row, state, scratch, sensors)
-        protect(protection, law_state, k, sensors, command, applied, law_work)
-        for c in range(3):
-            action[c] = applied[c] - command[c]
-        action[A_STICK_REASON] = law_state[law.L_STICK_CAUSE]
-        action[A_LEVER_REASON] = law_state[law.L_LEVER_CAUSE]
-        action[A_RATE_REASON] = law_state[law.L_RATE_CAUSE]
-        action[A_TIME] = law_state[law.L_TIME]
-        finish_frame(tables, state, scratch, row, (command, applied, noise[0][k], noise[1][k]), script, reaction)
+        ask_pilot(tables, state, scratch, rows[k], script, command)
+        advance(tables, state, scratch, rows[k], (command, command, noise[0][k], noise[1][k]))
+        take_notice(tables, state, scratch, rows[k], script, reaction)
     return rows.shape[0]
 
 
@@ -212,7 +159,6 @@ def _is_corridor(reason: float) -> bool:
 @inner_kernel
 def measure_trial(
     rows: FloatArray,
-    actions: FloatArray,
     programme: FloatArray,
     limits: TrialLimits,
     dt: float,
@@ -222,7 +168,6 @@ def measure_trial(
 
     Args:
         rows: The frames flown.
-        actions: What the law changed in them.
         programme: The simulation's programme, whose last point is where the flight should arrive.
         limits: Secondary limits.
         dt: Length of a frame [s].
@@ -237,7 +182,7 @@ def measure_trial(
     last = programme.shape[1] - 1
     stick_square = lever_square = 0.0
     for k in range(frames):
-        row, action = rows[k], actions[k]
+        row = rows[k]
         margin = row[COLUMN.margin_kt]
         out[M_MARGIN] = min(out[M_MARGIN], margin)
         if margin < OUTSIDE_MARGIN:
@@ -273,8 +218,11 @@ def measure_trial(
         out[M_PITCH] = max(out[M_PITCH], abs(row[COLUMN.pitch_deg]))
 
         corridor = other = False
-        for c in range(3):
-            reason = action[A_STICK_REASON + c]
+        for reason in (
+            row[COLUMN.protection_stick_reason],
+            row[COLUMN.protection_lever_reason],
+            row[COLUMN.protection_nacelle_reason],
+        ):
             if reason != 0.0:
                 if _is_corridor(reason):
                     corridor = True
@@ -288,12 +236,15 @@ def measure_trial(
             out[M_CORRIDOR_ACTIVE] += dt
         if other:
             out[M_OTHER_ACTIVE] += dt
-        stick_square += action[A_STICK] ** 2
-        lever_square += action[A_LEVER] ** 2
-        out[M_NACELLE_REMOVED] += abs(action[A_RATE]) * dt / DEGREE
+        stick_square += row[COLUMN.protection_stick] ** 2
+        lever_square += row[COLUMN.protection_lever] ** 2
+        out[M_NACELLE_REMOVED] += abs(row[COLUMN.protection_nacelle_rate_deg_s]) * dt
         if k > 0:
-            out[M_STICK_STEP] = max(out[M_STICK_STEP], abs(action[A_STICK] - actions[k - 1, A_STICK]))
-            out[M_LEVER_STEP] = max(out[M_LEVER_STEP], abs(action[A_LEVER] - actions[k - 1, A_LEVER]))
+            before = rows[k - 1]
+            step = abs(row[COLUMN.protection_stick] - before[COLUMN.protection_stick])
+            out[M_STICK_STEP] = max(out[M_STICK_STEP], step)
+            step = abs(row[COLUMN.protection_lever] - before[COLUMN.protection_lever])
+            out[M_LEVER_STEP] = max(out[M_LEVER_STEP], step)
         away = abs(row[COLUMN.airspeed_kt] - programme[1, last] / KNOT) > ARRIVED_AIRSPEED
         if away or abs(row[COLUMN.nacelle_deg] - programme[2, last] / DEGREE) > ARRIVED_NACELLE:
             out[M_ARRIVAL] = (k + 1) * dt
@@ -303,6 +254,3 @@ def measure_trial(
     out[M_AIRSPEED_END] = rows[frames - 1, COLUMN.airspeed_kt]
     out[M_NACELLE_END] = rows[frames - 1, COLUMN.nacelle_deg]
     out[M_FLOWN] = frames * dt
-
-
-__all__ = ["S_YIELDED", "ask_pilot", "fill_sensors", "finish_frame", "fly_trial", "measure_trial"]

@@ -1,0 +1,193 @@
+"""The work of a campaign in pieces: each a few runs of one class under every law, the same wherever it is done."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rtsim.errors import InputError
+from rtsim.frame import FloatArray
+from rtsim.protection.laws import LawSpec, load_laws
+from rtsim.protection.tables import LAW_NAMES
+from rtsim.units import kt
+from scenarios.campaign.draws import draw_plan
+from scenarios.campaign.spec import CampaignFile, parse_campaign
+from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
+from scenarios.campaign.trial_kernels import METRIC_COUNT
+
+CHUNK_RUNS = 10
+"""Runs of one class in a piece of work; not to be changed within a campaign, since pieces are what is kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class LawVariant:
+    """A law as a campaign flies it."""
+
+    name: str
+    """Built-in law, ``MODULE:CLASS``, entry point, or several separated by commas."""
+    buffer_kt: float = 0.0
+    """Added to the margins at which a built-in law begins to act [kn]."""
+
+    @property
+    def label(self) -> str:
+        """How it is called in tables: the name, with the buffer where there is one."""
+        return self.name if self.buffer_kt == 0.0 else f"{self.name}@{self.buffer_kt:+g}kt"
+
+    @property
+    def compiled(self) -> bool:
+        """Whether it is one of rtsim's own laws."""
+        return self.name in LAW_NAMES
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a worker needs to know to do its share; small and picklable."""
+
+    text: str
+    """The campaign file."""
+    file: str
+    """Where it came from."""
+    laws: tuple[LawVariant, ...]
+    """Laws, each flown on every run."""
+    seed: int
+    """The campaign's seed."""
+    plant: str
+    """Aircraft model."""
+    rate_hz: int
+    """Frames per second."""
+    folder: str = ""
+    """Where modules of laws are looked for besides the installed ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """One piece of work."""
+
+    class_number: int
+    """Place of the class in the campaign."""
+    first: int
+    """First run."""
+    count: int
+    """Runs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChunkResult:
+    """What came of a piece of work."""
+
+    chunk: Chunk
+    """The piece."""
+    metrics: FloatArray
+    """Metrics of every flight, shape (runs, laws, METRIC_COUNT)."""
+    problems: tuple[tuple[int, int, str], ...]
+    """What went wrong in laws: run, law, sentence."""
+    seconds: FloatArray
+    """CPU time of the flights by law, shape (laws,) [s]."""
+
+
+def plan_chunks(spec: CampaignFile, runs: int | None) -> list[Chunk]:
+    """Cut a campaign into pieces, class after class in turn, so that a beginning holds flights of every class.
+
+    Args:
+        spec: The campaign.
+        runs: Runs of every class; None: what the file says.
+    """
+    counts = [runs or item.runs or spec.runs for item in spec.classes]
+    found = []
+    for first in range(0, max(counts), CHUNK_RUNS):
+        found += [
+            Chunk(number, first, min(CHUNK_RUNS, count - first)) for number, count in enumerate(counts) if first < count
+        ]
+    return found
+
+
+def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
+    """Fly one piece of a campaign.
+
+    Args:
+        task: The campaign.
+        chunk: The piece.
+    """
+    spec = _spec(task.text, task.file)
+    bench = _bench(task.plant, spec.corridor, task.rate_hz)
+    metrics = np.zeros((chunk.count, len(task.laws), METRIC_COUNT))
+    seconds = np.zeros(len(task.laws))
+    problems: list[tuple[int, int, str]] = []
+    for k in range(chunk.count):
+        run = chunk.first + k
+        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run)
+        for number, law in enumerate(task.laws):
+            begin = time.process_time()
+            # The first run of every class asks laws in Python everything twice.
+            flight = fly_law(bench, plan, law, folder=task.folder, repeat=run == 0)
+            seconds[number] += time.process_time() - begin
+            metrics[k, number] = flight.metrics.values
+            problems += [(run, number, text) for text in flight.law_problems]
+    return ChunkResult(chunk, metrics, tuple(problems), seconds)
+
+
+def fly_law(
+    bench: Bench, plan: FlightPlan, law: LawVariant, *, folder: str = "", repeat: bool = False, keep: bool = False
+) -> TrialFlight:
+    """Fly one plan with one law; a law that cannot even be made is reported, and nothing acts in its place.
+
+    Args:
+        bench: What flies.
+        plan: The flight.
+        law: The law.
+        folder: Where modules of laws are looked for besides the installed ones.
+        repeat: Ask laws in Python everything twice.
+        keep: Give the history arrays of their own.
+    """
+    if law.compiled:
+        return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
+    try:
+        return bench.fly(plan, _python_laws(law.name, folder), repeat=repeat, keep=keep)
+    except InputError as error:
+        flight = bench.fly(plan, "off", keep=keep)
+        return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
+
+
+def law_chain(name: str, folder: str) -> Sequence[LawSpec]:
+    """Find a law, or several separated by commas.
+
+    Args:
+        name: What the user wrote.
+        folder: Where modules are looked for besides the installed ones.
+
+    Raises:
+        InputError: There is no such law.
+    """
+    import sys
+
+    if folder and folder not in sys.path:
+        sys.path.insert(0, folder)
+    return load_laws(name)
+
+
+@functools.lru_cache(maxsize=8)
+def _python_laws(name: str, folder: str) -> Sequence[LawSpec]:
+    return law_chain(name, folder)
+
+
+@functools.lru_cache(maxsize=4)
+def _spec(text: str, file: str) -> CampaignFile:
+    spec, problems = parse_campaign(text, file=file)
+    if spec is None:
+        raise problems[0]
+    return spec
+
+
+@functools.lru_cache(maxsize=4)
+def _bench(plant: str, corridor: str, rate_hz: int) -> Bench:
+    return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz)  # type: ignore[arg-type]  # the file was checked
+
+
+def present_folder() -> str:
+    """The folder a user works in, whose modules workers on this machine may need too."""
+    return str(Path.cwd())

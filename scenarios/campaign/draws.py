@@ -1,0 +1,198 @@
+"""Draws flights from a campaign's classes: the same flight for a seed, a class and a run, whoever draws it and when."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from rtsim.atmosphere import AirSpecification, Gust, Turbulence
+from rtsim.corridor import Corridor, load_corridor
+from rtsim.errors import InputError
+from rtsim.faults import Fault
+from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
+from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
+from rtsim.units import deg, kt, to_deg, to_kt
+from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
+from scenarios.campaign.trial import FlightPlan, has_trim
+from scenarios.loader import load_scenario
+from scenarios.script import Pulse
+
+ATTEMPTS = 200
+"""Starts drawn before a class is said to have none inside the corridor."""
+
+
+def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> FlightPlan:
+    """Draw one flight.
+
+    Args:
+        spec: The campaign.
+        seed: Its seed.
+        class_number: Place of the class in the campaign.
+        run: Number of the run within the class.
+
+    Raises:
+        InputError: No start of the class lies inside the corridor.
+    """
+    item = spec.classes[class_number]
+    generator = stream_generator(seed, STREAM_CAMPAIGN, class_number, run)
+    if item.scenarios:
+        scenario = load_scenario(item.scenarios[int(generator.integers(len(item.scenarios)))])
+        programme, start = scenario.programme, scenario.start
+        duration = scenario.duration if item.duration_s is None else item.duration_s
+    else:
+        start = _start(item, spec.corridor, generator)
+        programme = _programme(item, start, load_corridor(spec.corridor), generator)
+        duration = spec.duration_s if item.duration_s is None else item.duration_s
+    pulses = tuple(pulse for table in item.pulses for pulse in _pulses(table, generator))
+    faults = tuple(_faults(item, generator))
+    gusts = tuple(_gusts(item, generator))
+    severity = draw(item.turbulence_kt, generator)
+    turbulence = Turbulence(wind_at_20_ft=kt(severity)) if severity > 0.0 else None
+    wind = kt(draw(item.wind_kt, generator))
+    yields = generator.random() < item.pilot.yields
+    reaction = draw(item.pilot.reaction_s, generator)
+    return FlightPlan(
+        programme=programme,
+        start=start,
+        duration=duration,
+        pulses=pulses,
+        reaction=reaction if yields else None,
+        air=AirSpecification(turbulence=turbulence, gusts=gusts),
+        faults=faults,
+        wind=wind,
+        pilot_noise=item.pilot.noise,
+        seed=int(generator.integers(2**62)),
+    )
+
+
+def _start(item: ClassTable, corridor_name: str, generator: Generator) -> ProgrammePoint:
+    table = item.start
+    assert table is not None  # the file was checked
+    corridor = load_corridor(corridor_name)
+    for _ in range(ATTEMPTS):
+        nacelle = float(np.clip(draw(table.nacelle_deg, generator), 0.0, 90.0))
+        angle = deg(nacelle)
+        low = float(corridor.low.at(angle))
+        high = corridor.downstop_speed if angle <= corridor.downstop_nacelle else float(corridor.high.at(angle))
+        if table.airspeed_kt is not None:
+            airspeed = kt(draw(table.airspeed_kt, generator))
+        else:
+            assert table.above_low_kt is not None  # the file was checked
+            airspeed = low + kt(draw(table.above_low_kt, generator))
+        altitude = draw(table.altitude_m, generator)
+        margin = min(airspeed - low, high - airspeed)
+        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle):
+            return ProgrammePoint(airspeed, angle, altitude)
+    raise InputError(
+        f"no start of the class {item.name} lies inside the corridor and has a trim",
+        key=f"classes.{item.name}.start",
+        allowed=f"margins of {table.margin_kt:g} kn and more",
+        mend="widen its distributions",
+    )
+
+
+@functools.lru_cache(maxsize=64)
+def _has_trim(airspeed: float, angle: float) -> bool:
+    return has_trim("lpv", airspeed, angle)
+
+
+def _programme(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> Programme:
+    """Ramps of airspeed and nacelle angle from the start."""
+    ramps: list[tuple[float, float, float, float]] = []  # begin, end, from, to of airspeed, then of the nacelle
+    if item.speed is not None:
+        begin = max(draw(item.speed.begin_s, generator), 0.0)
+        acceleration = max(abs(draw(item.speed.acceleration_kt_s, generator)), 0.1)
+        target = _target(item, start, corridor, generator)
+        ramps.append((begin, begin + abs(target - start.airspeed) / kt(acceleration), start.airspeed, target))
+    else:
+        ramps.append((0.0, 0.0, start.airspeed, start.airspeed))
+    if item.nacelle is not None:
+        begin = max(draw(item.nacelle.begin_s, generator), 0.0)
+        rate = float(np.clip(abs(draw(item.nacelle.rate_deg_s, generator)), 0.1, 12.0))
+        goal = deg(float(np.clip(draw(item.nacelle.target_deg, generator), 0.0, 90.0)))
+        ramps.append((begin, begin + abs(goal - start.nacelle_angle) / deg(rate), start.nacelle_angle, goal))
+    else:
+        ramps.append((0.0, 0.0, start.nacelle_angle, start.nacelle_angle))
+    times = np.unique([0.0, *(time for ramp in ramps for time in ramp[:2])])
+    values = [
+        np.interp(times, ramp[:2], ramp[2:]) if ramp[1] > ramp[0] else np.full(times.shape, ramp[3]) for ramp in ramps
+    ]
+    return Programme(times, values[0], values[1], np.full(times.shape, start.altitude))
+
+
+def _target(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> float:
+    """Airspeed the pilot goes for [m/s]."""
+    table = item.speed
+    assert table is not None  # asked for by the caller only where there is one
+    angle = start.nacelle_angle
+    if table.target_kt is not None:
+        target = kt(draw(table.target_kt, generator))
+    elif table.beyond_high_kt is not None:
+        high = corridor.downstop_speed if angle <= corridor.downstop_nacelle else float(corridor.high.at(angle))
+        target = high + kt(draw(table.beyond_high_kt, generator))
+    else:
+        assert table.beyond_low_kt is not None  # the file was checked
+        target = float(corridor.low.at(angle)) - kt(draw(table.beyond_low_kt, generator))
+    return float(np.clip(target, AIRSPEED_RANGE[0], AIRSPEED_RANGE[1]))
+
+
+def _pulses(table: PulseDraw, generator: Generator) -> list[Pulse]:
+    time = draw(table.time_s, generator)
+    found = []
+    for _ in range(round(draw(table.count, generator))):
+        duration = max(draw(table.duration_s, generator), 0.02)
+        amount = draw(table.amount, generator)
+        if table.either_sign and generator.random() < 0.5:
+            amount = -amount
+        found.append(
+            Pulse(
+                channel=table.channel,
+                start=max(time, 0.0),
+                duration=duration,
+                amount=deg(amount) if table.channel == "switch" else amount,
+                shape=table.shape,
+                period=max(draw(table.period_s, generator), 0.05),
+                replaces=table.replaces,
+            )
+        )
+        time += duration + draw(table.gap_s, generator)
+    return found
+
+
+def _faults(item: ClassTable, generator: Generator) -> list[Fault]:
+    found = []
+    for table in item.faults:
+        start = max(draw(table.time_s, generator), 0.0)
+        end = None if table.duration_s is None else start + max(draw(table.duration_s, generator), 0.01)
+        bias = None if table.bias_kt is None else kt(draw(table.bias_kt, generator))
+        found.append(Fault(kind=table.kind, start=start, end=end, bias=bias))
+    return found
+
+
+def _gusts(item: ClassTable, generator: Generator) -> list[Gust]:
+    found = []
+    for table in item.gusts:
+        start = max(draw(table.time_s, generator), 0.0)
+        duration = max(draw(table.duration_s, generator), 0.1)
+        sign = -1.0 if table.either_sign and generator.random() < 0.5 else 1.0
+        ahead, below = sign * kt(draw(table.ahead_kt, generator)), sign * kt(draw(table.below_kt, generator))
+        found.append(Gust(start=start, duration=duration, ahead=ahead, below=below))
+    return found
+
+
+def describe_plan(plan: FlightPlan) -> dict[str, float | str]:
+    """The flight in a few numbers, for tables of runs.
+
+    Args:
+        plan: The flight.
+    """
+    return {
+        "start_airspeed_kt": to_kt(plan.start.airspeed),
+        "start_nacelle_deg": to_deg(plan.start.nacelle_angle),
+        "start_altitude_m": plan.start.altitude,
+        "target_airspeed_kt": to_kt(float(plan.programme.airspeed[-1])),
+        "target_nacelle_deg": to_deg(float(plan.programme.nacelle_angle[-1])),
+        "pulses": float(len(plan.pulses)),
+        "reaction_s": -1.0 if plan.reaction is None else plan.reaction,
+    }

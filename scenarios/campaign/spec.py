@@ -1,0 +1,321 @@
+"""What a campaign file may say: classes of flights as distributions, and what is expected of the law.
+
+Every number has its unit in its key. A number may be a constant or a distribution; unknown keys are errors.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from rtsim.errors import InputError
+from scenarios.problems import closest, explain, suggestion
+from scenarios.verdict_events import EVENTS
+
+Generator = np.random.Generator
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+MAX_FILE_BYTES = 1_000_000
+"""A campaign file larger than this is refused [bytes]."""
+
+
+class Strict(BaseModel):
+    """A table of a campaign file: exact types, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Uniform(Strict):
+    """Evenly between two numbers."""
+
+    uniform: Annotated[list[Finite], Field(min_length=2, max_length=2)]
+
+
+class Normal(Strict):
+    """A normal distribution: mean and standard deviation, cut at three deviations."""
+
+    normal: Annotated[list[Finite], Field(min_length=2, max_length=2)]
+
+
+class Choice(Strict):
+    """One of several numbers, equally likely unless weighted."""
+
+    choice: Annotated[list[Finite], Field(min_length=1, max_length=1000)]
+    weights: list[Annotated[float, Field(ge=0.0, allow_inf_nan=False)]] | None = None
+
+
+Number = Finite | Uniform | Normal | Choice
+"""A constant or a distribution."""
+
+
+class StartDraw(Strict):
+    """``start``: where the flight begins; outside the corridor, or without trim, it is drawn again."""
+
+    airspeed_kt: Number | None = None
+    above_low_kt: Number | None = None
+    nacelle_deg: Number = 90.0
+    altitude_m: Number = 300.0
+    margin_kt: Annotated[float, Field(ge=0.0, le=50.0)] = 3.0
+
+
+class SpeedDraw(Strict):
+    """``speed``: the airspeed the pilot goes for."""
+
+    begin_s: Number = 1.0
+    acceleration_kt_s: Number = 3.0
+    target_kt: Number | None = None
+    beyond_high_kt: Number | None = None
+    beyond_low_kt: Number | None = None
+
+
+class NacelleDraw(Strict):
+    """``nacelle``: the nacelle angle the programme goes for."""
+
+    begin_s: Number = 1.0
+    rate_deg_s: Number = 3.0
+    target_deg: Number
+
+
+class PulseDraw(Strict):
+    """One of ``pulses``: movements of a control, one after the other."""
+
+    channel: Literal["stick", "lever", "switch"]
+    count: Number = 1.0
+    time_s: Number = 2.0
+    duration_s: Number
+    gap_s: Number = 0.0
+    amount: Number
+    either_sign: bool = False
+    shape: Literal["step", "doublet", "sine"] = "step"
+    period_s: Number = 1.0
+    replaces: bool = False
+
+
+class FaultDraw(Strict):
+    """One of ``faults``."""
+
+    kind: Literal["nacelle-jammed", "airspeed-bias", "airspeed-frozen"]
+    time_s: Number
+    duration_s: Number | None = None
+    bias_kt: Number | None = None
+
+
+class GustDraw(Strict):
+    """One of ``gusts``: one-minus-cosine."""
+
+    time_s: Number
+    duration_s: Number
+    ahead_kt: Number = 0.0
+    below_kt: Number = 0.0
+    either_sign: bool = False
+
+
+class PilotDraw(Strict):
+    """``pilot``: how the built-in pilot behaves."""
+
+    yields: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    reaction_s: Number = 0.8
+    noise: bool = False
+
+
+class ClassTable(Strict):
+    """One of ``[[classes]]``: a kind of flight."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=60)]
+    title: str = ""
+    nominal: bool = False
+    """Flights in which a law should do nothing for the corridor's sake."""
+    runs: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] | None = None
+    scenarios: list[str] = []
+    """Library scenarios to choose from; replaces start, speed and nacelle."""
+    start: StartDraw | None = None
+    speed: SpeedDraw | None = None
+    nacelle: NacelleDraw | None = None
+    pulses: list[PulseDraw] = []
+    faults: list[FaultDraw] = []
+    gusts: list[GustDraw] = []
+    turbulence_kt: Number = 0.0
+    wind_kt: Number = 0.0
+    pilot: PilotDraw = PilotDraw()
+
+
+class ExpectRate(Strict):
+    """One of ``[[expect]]``: how often something may or must happen."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    event: str
+    of: str = "law"
+    classes: list[str] = []
+    upper_max: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    rate_max: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    rate_min: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+
+
+class CampaignFile(Strict):
+    """A whole campaign file."""
+
+    format: Literal[1]
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=100)]
+    title: Annotated[str, Field(min_length=1, max_length=200)]
+    description: str = ""
+    law: str = "full"
+    against: list[str] = []
+    plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
+    corridor: Literal["design", "flight"] = "flight"
+    rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
+    duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 40.0
+    runs: Annotated[int, Field(ge=1, le=10_000_000)] = 50
+    confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
+    classes: Annotated[list[ClassTable], Field(min_length=1, max_length=1000)]
+    expect: list[ExpectRate] = []
+
+
+def campaign_names() -> list[str]:
+    """Names of the campaigns that come with rtsim, sorted."""
+    folder = resources.files("scenarios.campaign") / "library"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_campaign(name_or_path: str | Path) -> tuple[CampaignFile, str]:
+    """Read a campaign file.
+
+    Args:
+        name_or_path: A campaign that comes with rtsim by name, or a path (with ``/`` or ending in ``.toml``).
+
+    Returns:
+        The campaign and its text.
+
+    Raises:
+        InputError: For the first mistake found.
+    """
+    text, file = _read(name_or_path)
+    spec, problems = parse_campaign(text, file=file)
+    if spec is None:
+        raise problems[0]
+    return spec, text
+
+
+def parse_campaign(text: str, *, file: str) -> tuple[CampaignFile | None, list[InputError]]:
+    """Check the text of a campaign file.
+
+    Args:
+        text: The TOML text.
+        file: Where it came from, for the messages.
+
+    Returns:
+        The campaign and no problems, or None and at least one.
+    """
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        message = str(error)
+        return None, [InputError(f"is not valid TOML: {message[:1].lower()}{message[1:]}", file=file)]
+    try:
+        spec = CampaignFile.model_validate(data)
+    except ValidationError as error:
+        return None, explain(error, CampaignFile, file)
+    problems = _contradictions(spec, file)
+    return (None, problems) if problems else (spec, [])
+
+
+def draw(number: Number, generator: Generator) -> float:
+    """Draw one number.
+
+    Args:
+        number: A constant or a distribution; a constant draws nothing.
+        generator: Where from.
+    """
+    if isinstance(number, Uniform):
+        low, high = number.uniform
+        return float(generator.uniform(low, high))
+    if isinstance(number, Normal):
+        mean, deviation = number.normal
+        return mean + deviation * float(np.clip(generator.standard_normal(), -3.0, 3.0))
+    if isinstance(number, Choice):
+        weights = number.weights
+        shares = None if weights is None else np.array(weights) / sum(weights)
+        return float(generator.choice(number.choice, p=shares))
+    return number
+
+
+def _read(name_or_path: str | Path) -> tuple[str, str]:
+    text = str(name_or_path)
+    if not (isinstance(name_or_path, Path) or "/" in text or text.endswith(".toml")):
+        names = campaign_names()
+        if text in names:
+            return (resources.files("scenarios.campaign") / "library" / f"{text}.toml").read_text("utf-8"), text
+        raise InputError(
+            "is not a campaign that comes with rtsim",
+            key="campaign",
+            value=text,
+            allowed=", ".join(closest(text, names)),
+            mend=f"{suggestion(text, names, otherwise='choose one')}, or give a path ending in .toml",
+        )
+    path = Path(name_or_path)
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise InputError("is too large for a campaign", file=text, allowed=f"at most {MAX_FILE_BYTES} bytes")
+        return path.read_text(encoding="utf-8"), text
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
+        raise InputError(f"cannot be read: {why}", file=text, mend="check the path") from None
+
+
+def _contradictions(spec: CampaignFile, file: str) -> list[InputError]:
+    found: list[InputError] = []
+    names = [item.name for item in spec.classes]
+    for number, item in enumerate(spec.classes):
+        key = f"classes[{number}]"
+        if names.index(item.name) != number:
+            found.append(InputError("is used twice", file=file, key=f"{key}.name", value=item.name))
+        found += [InputError(problem, file=file, key=f"{key}{place}", mend=mend) for place, problem, mend in _odd(item)]
+    for number, clause in enumerate(spec.expect):
+        key = f"expect[{number}]"
+        if clause.event not in EVENTS:
+            found.append(
+                InputError(
+                    "is not an event",
+                    file=file,
+                    key=f"{key}.event",
+                    value=clause.event,
+                    allowed=", ".join(EVENTS),
+                    mend=suggestion(clause.event, EVENTS, otherwise="choose one"),
+                )
+            )
+        laws = ("law", "off", spec.law, *spec.against)
+        if clause.of not in laws:
+            found.append(
+                InputError("is not flown", file=file, key=f"{key}.of", value=clause.of, allowed=", ".join(laws))
+            )
+        if clause.upper_max is None and clause.rate_max is None and clause.rate_min is None:
+            found.append(InputError("has no limit", file=file, key=key, mend="add upper_max, rate_max or rate_min"))
+        found += [
+            InputError("is not a class", file=file, key=f"{key}.classes", value=name, allowed=", ".join(names))
+            for name in clause.classes
+            if name not in names
+        ]
+    return found
+
+
+def _odd(item: ClassTable) -> list[tuple[str, str, str]]:
+    """What does not go together in a class: key, problem, mend."""
+    found = []
+    if item.scenarios and (item.start or item.speed or item.nacelle):
+        found.append(("", "has scenarios and a start of its own", "keep either"))
+    if not item.scenarios and item.start is None:
+        found.append((".start", "is missing", "say where flights begin, or give scenarios"))
+    if item.start is not None and (item.start.airspeed_kt is None) == (item.start.above_low_kt is None):
+        found.append((".start", "needs either airspeed_kt or above_low_kt", "give one of them"))
+    if item.speed is not None:
+        targets = (item.speed.target_kt, item.speed.beyond_high_kt, item.speed.beyond_low_kt)
+        if sum(target is not None for target in targets) != 1:
+            found.append((".speed", "needs one of target_kt, beyond_high_kt and beyond_low_kt", "give one of them"))
+    for number, fault in enumerate(item.faults):
+        if (fault.bias_kt is None) == (fault.kind == "airspeed-bias"):
+            found.append((f".faults[{number}].bias_kt", "belongs to airspeed-bias, and only there", "correct it"))
+    return found

@@ -1,0 +1,247 @@
+"""What a campaign says: counts with bounds, laws against each other, expectations held or not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from rtsim.frame import FloatArray
+from scenarios.campaign.chunks import LawVariant
+from scenarios.campaign.spec import CampaignFile, ExpectRate
+from scenarios.campaign.statistics import Rate, bound_decided, mcnemar, quantile, rate
+from scenarios.verdict_events import EVENTS
+from scenarios.verdict_metrics import METRIC_PLACE
+
+BOOTSTRAP_SEED = 20_000
+"""Added to the campaign's seed for the resampling."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flights:
+    """All flights so far, class by class."""
+
+    spec: CampaignFile
+    """The campaign."""
+    laws: tuple[LawVariant, ...]
+    """The laws; the last is ``off``."""
+    metrics: tuple[FloatArray, ...]
+    """By class: metrics, shape (runs, laws, METRIC_COUNT)."""
+    planned: tuple[int, ...]
+    """By class: runs of the whole campaign."""
+
+    @property
+    def off(self) -> int:
+        """Place of the unprotected flights among the laws."""
+        return len(self.laws) - 1
+
+    def happened(self, event: str, law: int, classes: Sequence[str] = ()) -> FloatArray:
+        """Whether an event happened, flight by flight, as 0 and 1.
+
+        Args:
+            event: One of ``EVENTS``.
+            law: Place of the law.
+            classes: Names of the classes; empty for all.
+        """
+        test = EVENTS[event]
+        found = [
+            test(metrics[:, law], metrics[:, self.off])
+            for item, metrics in zip(self.spec.classes, self.metrics, strict=True)
+            if not classes or item.name in classes
+        ]
+        return np.concatenate(found).astype(np.float64)
+
+    def runs_planned(self, classes: Sequence[str]) -> int:
+        """Flights of the whole campaign in some classes.
+
+        Args:
+            classes: Their names; empty for all.
+        """
+        return sum(
+            count
+            for item, count in zip(self.spec.classes, self.planned, strict=True)
+            if not classes or item.name in classes
+        )
+
+    def place_of(self, law: str) -> int:
+        """Place of a law by how expectations call it.
+
+        Args:
+            law: ``law``, ``off`` or a law's name.
+        """
+        if law == "law":
+            return 0
+        return next(place for place, item in enumerate(self.laws) if item.name == law and item.buffer_kt == 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One expectation and what the campaign made of it."""
+
+    name: str
+    """What was expected, in words."""
+    event: str
+    """What was counted."""
+    law: str
+    """Of which law."""
+    classes: tuple[str, ...]
+    """In which classes; empty for all."""
+    limit: str
+    """What was allowed, such as ``upper bound <= 0.01``."""
+    rate: Rate
+    """What was found."""
+    held: bool | None
+    """Whether it held; None while that is not decided."""
+
+    @property
+    def sentence(self) -> str:
+        """What to say where it failed."""
+        return f"{self.event} of {self.law}={self.rate.value:.4g} (bound {self.rate.upper:.4g}) want {self.limit}"
+
+
+def judge(flights: Flights, *, final: bool) -> list[Judged]:
+    """Judge the expectations of a campaign.
+
+    Args:
+        flights: What was flown.
+        final: Whether this is all; else only what more flights cannot change is decided.
+    """
+    return [_judged(flights, clause, final=final) for clause in flights.spec.expect]
+
+
+def _judged(flights: Flights, clause: ExpectRate, *, final: bool) -> Judged:
+    law = flights.place_of(clause.of)
+    happened = flights.happened(clause.event, law, clause.classes)
+    count, done = int(happened.sum()), len(happened)
+    confidence = flights.spec.confidence
+    planned = done if final else flights.runs_planned(clause.classes)
+    verdicts, words = [], []
+    if clause.upper_max is not None:
+        verdicts.append(bound_decided(count, done, planned, clause.upper_max, confidence=confidence))
+        words.append(f"upper bound <= {clause.upper_max:g}")
+    if clause.rate_max is not None:
+        most = math.floor(clause.rate_max * planned + 1e-9)
+        verdicts.append(False if count > most else True if count + planned - done <= most else None)
+        words.append(f"rate <= {clause.rate_max:g}")
+    if clause.rate_min is not None:
+        least = math.ceil(clause.rate_min * planned - 1e-9)
+        verdicts.append(True if count >= least else False if count + planned - done < least else None)
+        words.append(f"rate >= {clause.rate_min:g}")
+    held = False if False in verdicts else None if None in verdicts else True
+    return Judged(
+        name=clause.name,
+        event=clause.event,
+        law=flights.laws[law].label,
+        classes=tuple(clause.classes),
+        limit=" and ".join(words),
+        rate=rate(count, done, confidence=confidence),
+        held=held,
+    )
+
+
+def decided(judged: Sequence[Judged]) -> bool:
+    """Whether more flights can change nothing of the verdict; a campaign without expectations is flown to its end.
+
+    Args:
+        judged: The expectations so far.
+    """
+    return bool(judged) and all(item.held is not None for item in judged)
+
+
+def summarize(flights: Flights, seed: int) -> dict[str, Any]:
+    """Everything a campaign found, as JSON values.
+
+    Args:
+        flights: What was flown.
+        seed: The campaign's seed, from which the bootstrap's follows.
+    """
+    laws = [_law_summary(flights, place, seed) for place in range(len(flights.laws))]
+    return {
+        "laws": laws,
+        "classes": [
+            {
+                "name": item.name,
+                "nominal": item.nominal,
+                "runs": len(metrics),
+                "laws": {
+                    law.label: {
+                        event: asdict(rate(int(happened.sum()), len(happened), confidence=flights.spec.confidence))
+                        for event in ("exceeded", "deep", "activated", "harmed")
+                        for happened in (flights.happened(event, place, (item.name,)),)
+                    }
+                    for place, law in enumerate(flights.laws)
+                },
+            }
+            for item, metrics in zip(flights.spec.classes, flights.metrics, strict=True)
+        ],
+        "comparisons": _comparisons(flights),
+        "operating_characteristic": _characteristic(flights),
+    }
+
+
+def _law_summary(flights: Flights, place: int, seed: int) -> dict[str, Any]:
+    confidence = flights.spec.confidence
+    events = {}
+    for event in EVENTS:
+        happened = flights.happened(event, place)
+        events[event] = asdict(rate(int(happened.sum()), len(happened), confidence=confidence))
+    metrics = np.concatenate([values[:, place] for values in flights.metrics])
+    off = np.concatenate([values[:, flights.off] for values in flights.metrics])
+    outside = metrics[metrics[:, METRIC_PLACE["exceedances"]] > 0.0]
+
+    def spread(values: FloatArray, share: float) -> dict[str, float]:
+        return asdict(quantile(values, share, seed=seed % 2**32 + BOOTSTRAP_SEED, confidence=confidence))
+
+    def column(name: str, values: FloatArray) -> FloatArray:
+        picked: FloatArray = values[:, METRIC_PLACE[name]]
+        return picked
+
+    lost = column("height_lost_m", metrics)
+    return {
+        "law": flights.laws[place].label,
+        "buffer_kt": flights.laws[place].buffer_kt,
+        "flights": len(metrics),
+        "events": events,
+        "depth_kt": {"p50": spread(column("depth_kt", outside), 0.5), "p95": spread(column("depth_kt", outside), 0.95)},
+        "time_outside_s": {"p50": spread(column("time_outside_s", outside), 0.5)},
+        "height_lost_m": {"p90": spread(lost, 0.9), "max": float(lost.max(initial=0.0))},
+        "height_lost_beyond_off_m": {"max": float((lost - column("height_lost_m", off)).max(initial=0.0))},
+            "max": float((lost - column("height_lost_m", off)).max()) if len(lost) else math.nan
+        },
+        "flapping_peak_deg": {"max": float(column("flapping_peak_deg", metrics).max(initial=0.0))},
+        "torque_ratio_peak": {"max": float(column("torque_ratio_peak", metrics).max(initial=0.0))},
+        "stick_authority_rms": float(np.sqrt(np.mean(column("stick_authority_rms", metrics) ** 2))),
+        "lever_authority_rms": float(np.sqrt(np.mean(column("lever_authority_rms", metrics) ** 2))),
+    }
+
+
+def _comparisons(flights: Flights) -> list[dict[str, Any]]:
+    """The law under test against every other one, on the same flights."""
+    found = []
+    for other in range(1, len(flights.laws)):
+        for event in ("exceeded", "deep", "harmed"):
+            pair = mcnemar(flights.happened(event, 0), flights.happened(event, other))
+            found.append(
+                {"law": flights.laws[0].label, "against": flights.laws[other].label, "event": event, **asdict(pair)}
+            )
+    return found
+
+
+def _characteristic(flights: Flights) -> list[dict[str, Any]]:
+    """Nuisance against exceedance of the law under test, by buffer."""
+    name = flights.laws[0].name
+    nominal = [item.name for item in flights.spec.classes if item.nominal]
+    other = [item.name for item in flights.spec.classes if not item.nominal]
+    found = []
+    for place, law in sorted(enumerate(flights.laws), key=lambda pair: pair[1].buffer_kt):
+        if law.name != name:
+            continue
+        point: dict[str, Any] = {"law": law.label, "buffer_kt": law.buffer_kt}
+        for key, event, classes in (("nuisance", "nuisance", nominal), ("exceeded", "exceeded", other)):
+            happened = flights.happened(event, place, classes) if classes else np.zeros(0)
+            point[key] = asdict(rate(int(happened.sum()), len(happened), confidence=flights.spec.confidence))
+        found.append(point)
+    return found if len(found) > 1 else []
