@@ -63,7 +63,8 @@ class ClusterEvaluator:
         self._spec_json = problem.spec.model_dump_json()
         self._hash = problem.database_hash
         try:
-            self._client: Any = Client(address, timeout=CONNECT_TIMEOUT_S, set_as_default=False)
+            connect: Any = Client  # untyped
+            self._client = connect(address, timeout=CONNECT_TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(
                 f"no Dask scheduler answers there ({str(error) or type(error).__name__})",

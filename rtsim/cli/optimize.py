@@ -1,0 +1,252 @@
+"""``rtsim optimize``: searches the best conversion path, with progress, Ctrl-C, resume and a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rtsim.cli.output import console, emit_json, results, whole_file
+from rtsim.errors import InputError
+
+if TYPE_CHECKING:
+    from rtsim.optimization.path import ConversionPath
+    from rtsim.optimization.problem import ConversionProblem
+    from rtsim.optimization.search import Evaluator, Progress, SearchResult
+    from rtsim.optimization.spec import SearchSpec
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the app.
+
+    Args:
+        app: The ``rtsim`` command.
+    """
+    app.command("optimize")(optimize_command)
+
+
+def optimize_command(
+    spec: Annotated[Path | None, typer.Argument(help="Specification (TOML); without one, the paper's search.")] = None,
+    *,
+    objective: Annotated[
+        list[str] | None, typer.Option(help="What to minimize; repeat for a Pareto front (with --method nsga2).")
+    ] = None,
+    like: Annotated[
+        str | None, typer.Option(help="Constraint set of a path of the paper: typical, near_stall, centre_line, ...")
+    ] = None,
+    generations: Annotated[int | None, typer.Option(help="Generations to search.")] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates per generation.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Root of the search's random stream.")] = None,
+    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.")] = None,
+    handling: Annotated[str | None, typer.Option(help="Constraints by feasibility or by penalty.")] = None,
+    points: Annotated[int | None, typer.Option(help="Free points of the path.")] = None,
+    nacelle_rate_deg_s: Annotated[float | None, typer.Option(help="Nacelle rate [deg/s].")] = None,
+    robust: Annotated[int | None, typer.Option(help="Flights in turbulence that judge each path; 0: calm air.")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Threads that fly; default one per core.", min=1, max=256)] = None,
+    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to fly on.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Scenario file to write; default NAME.toml here.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the record beside the scenario file.")] = False,
+    no_check: Annotated[bool, typer.Option("--no-check", help="Leave the nonlinear check flight out.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
+) -> None:
+    """Search the best conversion path by flying every candidate in the closed loop.
+
+    Args:
+        spec: Specification file.
+        objective: What to minimize.
+        like: Constraint set of a path of the paper.
+        generations: Generations to search.
+        population: Candidates per generation.
+        seed: Root of the search's random stream.
+        method: Search method.
+        handling: How constraints are handled.
+        points: Free points of the path.
+        nacelle_rate_deg_s: Nacelle rate [deg/s].
+        robust: Flights in turbulence that judge each path.
+        jobs: Threads that fly; the result does not depend on it.
+        dask: Address of a Dask scheduler.
+        out: Scenario file to write.
+        resume: Go on from the record of an earlier run.
+        no_check: Leave the nonlinear check flight out.
+        json: Print one JSON object on stdout.
+
+    Raises:
+        InputError: A value is not allowed, a package is missing, or the record belongs to another search.
+        OutputError: A file cannot be written.
+    """
+    changes = {
+        "objectives": objective,
+        "points": points,
+        "nacelle_rate_deg_s": nacelle_rate_deg_s,
+        "search.generations": generations,
+        "search.population": population,
+        "search.seed": seed,
+        "search.method": method,
+        "search.handling": handling,
+        "robust.flights": robust,
+    }
+    chosen = _specification(spec, like, {key: value for key, value in changes.items() if value is not None})
+    scenario_file = out if out is not None else Path(f"{chosen.name}.toml")
+    if scenario_file.suffix != ".toml":
+        raise InputError("must end in .toml", key="--out", value=str(scenario_file))
+    if not scenario_file.parent.is_dir():
+        raise InputError("its directory does not exist", key="--out", value=str(scenario_file), mend="create it")
+    record_file = scenario_file.with_suffix(".search.npz")
+    if resume and not record_file.exists():
+        raise InputError("there is no record to resume from", key="--resume", value=str(record_file))
+
+    from rtsim.optimization.problem import ConversionProblem
+
+    problem = ConversionProblem(chosen, workers=jobs)
+    if not resume:
+        record_file.unlink(missing_ok=True)
+    result = _search(problem, dask, record_file)
+    summary = _save(problem, result, scenario_file, record_file, check=not no_check and not result.interrupted)
+    if json:
+        emit_json(summary)
+    else:
+        _print(summary)
+    if result.interrupted:
+        console.print("Stopped early; go on with the same command and --resume.")
+    if result.stopped_by is not None:
+        raise result.stopped_by
+
+
+def _specification(file: Path | None, like: str | None, changes: dict[str, Any]) -> SearchSpec:
+    from rtsim.optimization.spec import SearchSpec, checked_spec, load_spec, spec_like
+
+    if file is not None and like is not None:
+        raise InputError("cannot be combined with a specification file", key="--like", mend="give one of them")
+    if file is not None:
+        base = load_spec(file)
+    elif like is not None:
+        base = spec_like(like)
+    else:
+        base = SearchSpec()
+    data = base.model_dump()
+    for key, value in changes.items():
+        table, _, name = key.rpartition(".")
+        (data[table] if table else data)[name] = value
+    several = len(data["objectives"]) > 1
+    if several and "search.method" not in changes and file is None:
+        data["search"]["method"] = "nsga2"
+    return checked_spec(data)
+
+
+def _search(problem: ConversionProblem, address: str | None, record_file: Path) -> SearchResult:
+    from rtsim.optimization.search import run_search
+
+    with _evaluator(problem, address) as evaluator, _progress_bar(problem.spec.search.generations) as told:
+        return run_search(problem, evaluator=evaluator, record_path=record_file, on_progress=told)
+
+
+def _evaluator(problem: ConversionProblem, address: str | None) -> Any:
+    if address is None:
+        evaluator: Evaluator | None = None
+        return nullcontext(evaluator)
+    from rtsim.optimization.cluster import ClusterEvaluator
+
+    return ClusterEvaluator(problem, address)
+
+
+@contextmanager
+def _progress_bar(generations: int) -> Iterator[Callable[[Progress], None]]:
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (
+        TextColumn("Searching"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[best]}"),
+    )
+    with Bar(*columns, console=console.real()) as bar:
+        task = bar.add_task("search", total=generations, best="")
+
+        def told(progress: Progress) -> None:
+            mark = "" if progress.feasible else " (breaks a limit)"
+            bar.update(task, completed=progress.generation, best=f"best {progress.best:.6g}{mark}")
+
+        yield told
+
+
+def _save(
+    problem: ConversionProblem, result: SearchResult, scenario_file: Path, record_file: Path, *, check: bool
+) -> dict[str, Any]:
+    """Write the scenario file and put the answer together."""
+    from rtsim.optimization.report import baseline_summary, best_path, figures_summary, nonlinear_check, scenario_text
+
+    path = best_path(problem, result)
+    with whole_file(scenario_file) as temporary:
+        temporary.write_text(scenario_text(problem, path), encoding="utf-8")
+    spec = problem.spec
+    flown = problem.fly([path])[0][0]
+    summary: dict[str, Any] = {
+        "name": spec.name,
+        "method": spec.search.method,
+        "handling": spec.search.handling,
+        "seed": spec.search.seed,
+        "database_hash": problem.database_hash,
+        "best": {
+            "objective": spec.objectives[0],
+            "value": result.objectives[0],
+            "objectives": dict(zip(spec.objectives, result.objectives, strict=True)),
+            "feasible": result.feasible,
+            "constraints": result.constraints,
+            "points": _points(path),
+            "duration_s": flown.duration_s,
+            "figures": figures_summary(flown),
+        },
+        "baseline": baseline_summary(problem),
+        "evaluations": result.evaluations,
+        "generations": result.generations,
+        "seconds_per_generation": result.seconds_per_generation,
+        "interrupted": result.interrupted,
+        "history": list(result.history),
+        "scenario_file": str(scenario_file),
+        "record_file": str(record_file),
+    }
+    if len(spec.objectives) > 1:
+        summary["front"] = [
+            {
+                "objectives": dict(zip(spec.objectives, point.objectives, strict=True)),
+                "points": _points(problem.path(point.variables)),
+            }
+            for point in result.front
+        ]
+    if check:
+        checked = nonlinear_check(problem, path)
+        summary["nonlinear_check"] = figures_summary(checked)
+    return summary
+
+
+def _points(path: ConversionPath) -> list[dict[str, float]]:
+    return [{"airspeed_kt": point.airspeed_kt, "nacelle_deg": point.nacelle_deg} for point in path.points]
+
+
+def _print(summary: dict[str, Any]) -> None:
+    from rich.table import Table
+
+    best = summary["best"]
+    table = Table(title=f"{summary['name']}: {best['objective']}")
+    for column in ("path", best["objective"], "within limits", "duration [s]"):
+        table.add_column(column, justify="left" if column == "path" else "right")
+    rows = [("best found", best), *summary["baseline"].items()]
+    for name, row in rows:
+        table.add_row(name, f"{row['value']:.4g}", "yes" if row["feasible"] else "no", f"{row['duration_s']:.1f}")
+    results.print(table)
+    pace = summary["seconds_per_generation"]
+    results.print(f"{summary['evaluations']} candidates in {summary['generations']} generations, {pace:.1f} s each.")
+    if "nonlinear_check" in summary:
+        flown = summary["nonlinear_check"]
+        words = "completes" if flown["completed"] else "DOES NOT complete"
+        results.print(
+            f"The nonlinear model {words} it: {best['objective']} {flown['objectives'][best['objective']]:.4g}, "
+            f"altitude within {flown['altitude_deviation_m']:.1f} m."
+        )
+    results.print(f"Wrote {summary['scenario_file']}; fly it with: rtsim fly {summary['scenario_file']}")

@@ -1,0 +1,126 @@
+"""What a finished search hands to people: the best path as a scenario, beside the paper's paths."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from rtsim.optimization.batch import BatchFlight, BatchFlyer
+from rtsim.optimization.figures import FlightFigures, objective_value
+from rtsim.optimization.path import ConversionPath
+from rtsim.optimization.problem import ConversionProblem
+from rtsim.optimization.search import SearchResult
+
+METRIC_OF: dict[str, str] = {
+    "flapping_integral": "flapping_deg.integral_deg_s",
+    "flapping_peak": "flapping_deg.peak",
+    "flapping_rms": "flapping_deg.rms",
+    "stick_effort": "stick.rms_rate_in_s",
+    "lever_effort": "lever.rms_rate_per_s",
+    "altitude_excursion": "altitude_m.max_deviation",
+}
+"""The key of ``rtsim fly --json`` that holds an objective, where one does."""
+
+
+def best_path(problem: ConversionProblem, result: SearchResult) -> ConversionPath:
+    """The best path with a description of what it is.
+
+    Args:
+        problem: What was searched.
+        result: What was found.
+    """
+    return described(problem, problem.path(result.best), result.objectives)
+
+
+def described(problem: ConversionProblem, path: ConversionPath, objectives: tuple[float, ...]) -> ConversionPath:
+    """A path of the search with a description of what it is.
+
+    Args:
+        problem: What was searched.
+        path: The path.
+        objectives: Its objectives.
+    """
+    spec = problem.spec
+    values = ", ".join(f"{name} {value:.6g}" for name, value in zip(spec.objectives, objectives, strict=True))
+    search = spec.search
+    robust = f", over {spec.robust.flights} flights in turbulence" if spec.robust.flights else ""
+    text = (
+        f"Found by {search.method}, seed {search.seed}, {search.generations} x {search.population} candidates{robust}: "
+        f"{values}. Nacelle rate {spec.nacelle_rate_deg_s:g} deg/s."
+    )
+    return dataclasses.replace(path, description=text)
+
+
+def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
+    """The scenario file of a path found: it flies exactly as the search flew it.
+
+    Args:
+        problem: What was searched.
+        path: The path.
+    """
+    spec, limits = problem.spec, problem.spec.limits
+    flight: dict[str, str | int | float | bool] = {
+        "plant": spec.flight.plant,
+        "outer_loop": spec.flight.outer_loop,
+        "corridor": spec.flight.corridor,
+        "rate_hz": spec.flight.rate_hz,
+    }
+    expectations = (
+        ("keeps its distance to the corridor's boundaries", "corridor.worst_margin_kt", limits.margin_kt, None),
+        ("holds altitude", "altitude_m.max_deviation", None, limits.altitude_m),
+        ("follows the airspeed reference", "airspeed_kt.max_error", None, limits.airspeed_error_kt),
+        ("flapping stays below its limit", "flapping_deg.peak", None, limits.flapping_deg),
+        ("no control reaches its stop", "controls_on_stop_frames", None, 0.0),
+    )
+    return path.to_scenario_toml(flight=flight, altitude_m=spec.flight.altitude_m, expectations=expectations)
+
+
+def baseline_summary(problem: ConversionProblem) -> dict[str, dict[str, Any]]:
+    """The paper's paths within the same constraint set: objectives, and whether they keep the limits.
+
+    Args:
+        problem: What was searched.
+    """
+    paths = problem.baselines()
+    summary: dict[str, dict[str, Any]] = {}
+    for (name, path), figures in zip(paths.items(), problem.fly(list(paths.values())), strict=True):
+        objectives, constraints = problem.worth(path, figures)
+        summary[name] = {
+            "value": objectives[0],
+            "objectives": dict(zip(problem.spec.objectives, objectives, strict=True)),
+            "feasible": max(constraints) <= 0.0,
+            "duration_s": figures[0].duration_s,
+        }
+    return summary
+
+
+def nonlinear_check(problem: ConversionProblem, path: ConversionPath) -> FlightFigures:
+    """The path flown once in calm air by the nonlinear model, which the search does not use.
+
+    Args:
+        problem: What was searched.
+        path: The path.
+    """
+    altitude = problem.spec.flight.altitude_m
+    setup = dataclasses.replace(
+        problem.setup,
+        programme=path.programme(altitude),
+        plant="nonlinear",
+        pilot_noise=False,
+        air=type(problem.setup.air)(),
+    )
+    return BatchFlyer(setup, workers=1).fly_one(BatchFlight(path.programme(altitude)))
+
+
+def figures_summary(figures: FlightFigures) -> dict[str, Any]:
+    """Figures of merit with every objective, for JSON.
+
+    Args:
+        figures: The flight.
+    """
+    from rtsim.optimization.figures import OBJECTIVES
+
+    return {
+        **dataclasses.asdict(figures),
+        "objectives": {name: objective_value(figures, name) for name in OBJECTIVES},
+    }
