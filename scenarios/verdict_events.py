@@ -86,5 +86,5 @@ EVENTS: Mapping[str, EventTest] = {
     "delayed": _delayed,
 }
 """Events by name: corridor left; left by more than 5 kn; law acted for the corridor; the same needlessly; a secondary
-limit exceeded, by name; harm done (height, or a secondary limit its twin kept); 30 m more height lost; arrived more than
-0.5 s later."""
+limit exceeded, by name; harm done (height, or a secondary limit its twin kept); 30 m more height lost; arrived more
+than 0.5 s later."""

@@ -209,8 +209,6 @@ def _law_summary(flights: Flights, place: int, seed: int) -> dict[str, Any]:
         "time_outside_s": {"p50": spread(column("time_outside_s", outside), 0.5)},
         "height_lost_m": {"p90": spread(lost, 0.9), "max": float(lost.max(initial=0.0))},
         "height_lost_beyond_off_m": {"max": float((lost - column("height_lost_m", off)).max(initial=0.0))},
-            "max": float((lost - column("height_lost_m", off)).max()) if len(lost) else math.nan
-        },
         "flapping_peak_deg": {"max": float(column("flapping_peak_deg", metrics).max(initial=0.0))},
         "torque_ratio_peak": {"max": float(column("torque_ratio_peak", metrics).max(initial=0.0))},
         "stick_authority_rms": float(np.sqrt(np.mean(column("stick_authority_rms", metrics) ** 2))),
