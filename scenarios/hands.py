@@ -187,7 +187,7 @@ class Hands:
         sticks, age = self._link.input.read(), self._link.input.age()
         fresh = sticks.sequence > 0 and age <= self._settings.loss_time
         simulation = flight.simulation
-        if self._waiting and fresh and sticks.stick_valid and sticks.lever_valid:
+        if self._waiting and fresh and (sticks.stick_valid or sticks.lever_valid):
             self._waiting = False
             if simulation.mode != "external":
                 flight.switch_pilot("external")

@@ -208,6 +208,7 @@ class MavlinkLink:
         if hangs:
             self._process.kill()
             self._process.wait()
+        self._drop_output()
         self.restarts += 1
         self._life_sign_at = now
         self._exchange.header[READY] = 0
@@ -241,8 +242,7 @@ class MavlinkLink:
             self._process.wait()
         self._closed = True
         atexit.unregister(self.close)
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+        self._drop_output()
         self._ring.close()
         self._exchange.close()
 
@@ -259,6 +259,10 @@ class MavlinkLink:
             process.stdin.write(self.config.to_json().encode() + b"\n")
             process.stdin.close()
         return process
+
+    def _drop_output(self) -> None:
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
     def _fail(self) -> None:
         """Keep the reason why there is no vehicle."""

@@ -328,7 +328,7 @@ class MessageFactory:
             1000.0 + 1000.0 * float(state.armed),
         )
         raw = [whole(channel, 800, 2200) for channel in channels] + [65535] * 10
-        rssi = 254 if int(state.feedback.input_state) == INPUT_LIVE else 0
+        rssi = 100 if int(state.feedback.input_state) == INPUT_LIVE else 0
         return [dialect.MAVLink_rc_channels_message(state.boot_ms, 8, *raw, rssi)]
 
     def _servo_output(self) -> list[Any]:

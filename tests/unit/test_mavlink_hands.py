@@ -104,7 +104,9 @@ def test_the_virtual_pilot_holds_until_sticks_arrive_and_no_control_steps(flight
     both = np.vstack((before, after))
     assert np.max(np.abs(np.diff(both[:, COLUMN.stick]))) <= 0.02  # 1 % of the travel from -1 to 1
     assert np.max(np.abs(np.diff(both[:, COLUMN.lever]))) <= 0.01
-    assert [(event.kind, event.data["mode"], event.data["row"]) for event in flight.events] == [("pilot", "external", 50)]
+    assert [(event.kind, event.data["mode"], event.data["row"]) for event in flight.events] == [
+        ("pilot", "external", 50)
+    ]
 
 
 def test_a_pilot_chosen_on_purpose_is_not_taken_over_by_sticks(flight):
