@@ -8,23 +8,16 @@ from typing import Literal
 
 import numpy as np
 
-from rtsim.frame import FloatArray
-from scenarios import script_kernels as kernels
+from rtsim.frame import FloatArray  # of arrays, without compiled code: reading a file must stay quick
 
 Channel = Literal["stick", "lever", "switch"]
 Shape = Literal["step", "doublet", "sine"]
-CHANNELS: dict[Channel, int] = {
-    "stick": kernels.CHANNEL_STICK,
-    "lever": kernels.CHANNEL_LEVER,
-    "switch": kernels.CHANNEL_SWITCH,
-}
-"""Channels by name, with their number in the kernels."""
-SHAPES: dict[Shape, int] = {
-    "step": kernels.SHAPE_STEP,
-    "doublet": kernels.SHAPE_DOUBLET,
-    "sine": kernels.SHAPE_SINE,
-}
-"""Shapes of pulses by name, with their number in the kernels."""
+CHANNELS: dict[Channel, int] = {"stick": 0, "lever": 1, "switch": 2}
+"""Channels by name, with their number in ``scenarios.script_kernels``."""
+SHAPES: dict[Shape, int] = {"step": 0, "doublet": 1, "sine": 2}
+"""Shapes of pulses by name, with their number in ``scenarios.script_kernels``."""
+PULSE_SIZE = 7
+"""Numbers of a pulse in the kernels' table."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +46,7 @@ def pulse_table(pulses: Sequence[Pulse]) -> FloatArray:
     Args:
         pulses: The movements, in any order; they add up where they overlap.
     """
-    table = np.zeros((len(pulses), kernels.PULSE_SIZE))
+    table = np.zeros((len(pulses), PULSE_SIZE))
     for row, pulse in zip(table, sorted(pulses, key=lambda pulse: pulse.start), strict=True):
         row[:] = (
             CHANNELS[pulse.channel],

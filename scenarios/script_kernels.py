@@ -17,7 +17,6 @@ SHAPE_STEP, SHAPE_DOUBLET, SHAPE_SINE = 0, 1, 2
 # Places in a row of pulses.
 P_CHANNEL, P_START, P_END, P_AMOUNT, P_SHAPE, P_PERIOD, P_SET = 0, 1, 2, 3, 4, 5, 6
 """P_AMOUNT: added to stick or lever, or the nacelle rate [rad/s]; P_SET 1: it replaces what the pilot gives."""
-PULSE_SIZE = 7
 
 # Places in the script's state.
 S_WARNED_SINCE, S_YIELDED, S_SWITCHED, S_HELD_AIRSPEED = 0, 1, 2, 3

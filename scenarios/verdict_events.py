@@ -16,7 +16,7 @@ NUISANCE_MARGIN_KT = 3.0
 NO_HARM_HEIGHT = 30.0
 """Height a law may lose beyond what its unprotected twin lost [m]."""
 DELAY_S = 0.5
-"""Later arrival that counts as a delay [s]."""
+"""Later end of the conversion (``conversion_s``) that counts as a delay [s]."""
 
 EventTest = Callable[[FloatArray, FloatArray], BoolArray]
 """Metrics of protected flights and of their twins, (flights, METRIC_COUNT) each, to whether it happened (flights,)."""
@@ -72,7 +72,7 @@ def _harmed(law: FloatArray, off: FloatArray) -> BoolArray:
 
 
 def _delayed(law: FloatArray, off: FloatArray) -> BoolArray:
-    return _of(law, "arrival_s") > _of(off, "arrival_s") + DELAY_S
+    return _of(law, "conversion_s") > _of(off, "conversion_s") + DELAY_S
 
 
 EVENTS: Mapping[str, EventTest] = {
@@ -86,5 +86,5 @@ EVENTS: Mapping[str, EventTest] = {
     "delayed": _delayed,
 }
 """Events by name: corridor left; left by more than 5 kn; law acted for the corridor; the same needlessly; a secondary
-limit exceeded, by name; harm done (height, or a secondary limit its twin kept); 30 m more height lost; arrived more
-than 0.5 s later."""
+limit exceeded, by name; harm done (height, or a secondary limit its twin kept); 30 m more height lost; conversion
+ended more than 0.5 s later."""

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from rtsim.frame import FloatArray
-from scenarios.campaign import trial_kernels as kernels
 
 BoolArray = npt.NDArray[np.bool_]
-
-Flight = Literal["law", "off", "difference"]
-"""Whose value a clause bounds: the protected flight's, its unprotected twin's, or the first minus the second."""
-FLIGHTS: tuple[Flight, ...] = ("law", "off", "difference")
 
 TRIAL_METRICS: dict[str, str] = {
     "exceedances": "corridor exceedances: margin below -0.5 kn for 0.1 s, those within 0.5 s merged",
@@ -47,11 +41,11 @@ TRIAL_METRICS: dict[str, str] = {
     "airspeed_final_kt": "airspeed of the last frame [kn]",
     "nacelle_final_deg": "nacelle angle of the last frame [deg]",
     "flown_s": "length of the flight as flown [s]",
+    "conversion_s": "time at which nacelles and airspeed are where the programme's nacelle motion ends [s]",
 }
 """Metrics of a trial by name, in the order of the kernels."""
 METRIC_PLACE: dict[str, int] = {name: place for place, name in enumerate(TRIAL_METRICS)}
 """Place of each metric in the kernels' array."""
-assert len(TRIAL_METRICS) == kernels.METRIC_COUNT  # both lists are edited together
 
 SECONDARY_LIMITS = ("flapping", "torque", "load_factor", "pitch", "control")
 """Limits besides the corridor, by name: 12 deg of flapping, 1.02 of the torque limit, load factor -0.5 to 3, 25 deg of

@@ -43,9 +43,9 @@ ARRIVED_AIRSPEED, ARRIVED_NACELLE = 1.0, 0.5
     M_LOAD_MAX, M_LOAD_MIN, M_PITCH,
     M_CORRIDOR_ACTIVATIONS, M_CORRIDOR_ACTIVE, M_OTHER_ACTIVE, M_STICK_AUTHORITY, M_LEVER_AUTHORITY,
     M_NACELLE_REMOVED, M_STICK_STEP, M_LEVER_STEP,
-    M_COMPLETED, M_YIELDED, M_ARRIVAL, M_AIRSPEED_END, M_NACELLE_END, M_FLOWN,
-) = range(28)  # fmt: skip
-METRIC_COUNT = 28
+    M_COMPLETED, M_YIELDED, M_ARRIVAL, M_AIRSPEED_END, M_NACELLE_END, M_FLOWN, M_CONVERSION,
+) = range(29)  # fmt: skip
+METRIC_COUNT = 29
 
 
 class TrialLimits(NamedTuple):
@@ -180,6 +180,12 @@ def measure_trial(
     quiet = 1e9  # time since the last exceedance
     unacted = 1e9  # time since the law's last corridor action
     last = programme.shape[1] - 1
+    # Where the programme's nacelle motion ends, and the airspeed it has there.
+    turned = last
+    while turned > 0 and programme[2, turned - 1] == programme[2, last]:
+        turned -= 1
+    goal, way = programme[1, turned], programme[1, turned] - programme[1, 0]
+    converted = -1.0
     stick_square = lever_square = 0.0
     for k in range(frames):
         row = rows[k]
@@ -245,6 +251,10 @@ def measure_trial(
             out[M_STICK_STEP] = max(out[M_STICK_STEP], step)
             step = abs(row[COLUMN.protection_lever] - before[COLUMN.protection_lever])
             out[M_LEVER_STEP] = max(out[M_LEVER_STEP], step)
+        if converted < 0.0 and abs(row[COLUMN.nacelle_deg] - programme[2, last] / DEGREE) <= ARRIVED_NACELLE:
+            short = goal / KNOT - row[COLUMN.airspeed_kt]
+            if way == 0.0 or (short if way > 0.0 else -short) <= ARRIVED_AIRSPEED:
+                converted = (k + 1) * dt
         away = abs(row[COLUMN.airspeed_kt] - programme[1, last] / KNOT) > ARRIVED_AIRSPEED
         if away or abs(row[COLUMN.nacelle_deg] - programme[2, last] / DEGREE) > ARRIVED_NACELLE:
             out[M_ARRIVAL] = (k + 1) * dt
@@ -254,3 +264,4 @@ def measure_trial(
     out[M_AIRSPEED_END] = rows[frames - 1, COLUMN.airspeed_kt]
     out[M_NACELLE_END] = rows[frames - 1, COLUMN.nacelle_deg]
     out[M_FLOWN] = frames * dt
+    out[M_CONVERSION] = converted if converted >= 0.0 else frames * dt

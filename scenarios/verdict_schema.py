@@ -1,0 +1,48 @@
+"""Tables of a scenario file for scripted misuse and for tests of envelope protection."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Strict(BaseModel):
+    """A table of a scenario file: exact types, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class PulseTable(Strict):
+    """One of ``[[pulses]]``: what a hand does to a control besides the pilot."""
+
+    channel: Literal["stick", "lever", "switch"]
+    time_s: Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
+    duration_s: Annotated[float, Field(gt=0.0, le=36_000.0, allow_inf_nan=False)]
+    amount: Annotated[float, Field(ge=-12.0, le=12.0, allow_inf_nan=False)]
+    shape: Literal["step", "doublet", "sine"] = "step"
+    period_s: Annotated[float, Field(ge=0.05, le=600.0, allow_inf_nan=False)] = 1.0
+    replaces: bool = False
+
+
+class TrialExpectTable(Strict):
+    """One of ``[[trial.expect]]``: a metric of the trial and its limits; the unit is in the metric's name."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    metric: str
+    of: Literal["law", "off", "difference"] = "law"
+    min: Finite | None = None
+    max: Finite | None = None
+
+
+class TrialTable(Strict):
+    """``[trial]``: the scenario is a test of envelope protection, flown with a law and, with the same seed, without."""
+
+    kind: Literal["nominal", "misuse", "failure", "unprotectable"]
+    law: Annotated[str, Field(max_length=200)] = "full"
+    off_leaves: list[Literal["corridor", "flapping", "torque", "load_factor", "pitch", "control", "height"]] = []
+    off_depth_kt: Annotated[float, Field(ge=0.0, le=300.0)] = 0.0
+    no_harm_height_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 30.0
+    expect: Annotated[list[TrialExpectTable], Field(max_length=1000)] = []
