@@ -32,7 +32,7 @@ from rtsim.faults.fault_kernels import (
     fault_update,
 )
 from rtsim.frame import COLUMN
-from rtsim.lpv.lpv_kernels import LpvTables, lpv_outputs, lpv_step
+from rtsim.lpv.lpv_kernels import LpvTables
 from rtsim.nacelle.nacelle_kernels import (
     NacelleTables,
     nacelle_advance,
@@ -43,6 +43,7 @@ from rtsim.nacelle.nacelle_kernels import (
     on_downstop,
 )
 from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance_in, mocm_engage, mocm_output_in
+from rtsim.plant_kernels import AircraftFrame, plant_outputs, plant_step
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_due, protect
 from rtsim.ramp_filter_kernels import critically_damped_ramp
@@ -57,7 +58,6 @@ from rtsim.units import (
 
 FloatArray = npt.NDArray[np.float64]
 
-PLANT_LPV, PLANT_NONLINEAR = 0, 1
 MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
 
 # Places in SimulationState.clock.
@@ -83,16 +83,14 @@ TARGET_SIZE = 5
 class SimulationTables(NamedTuple):
     """Everything the frame reads and never writes."""
 
-    plant: int
-    """PLANT_LPV or PLANT_NONLINEAR."""
     dt: float
     """Length of a frame [s]."""
     wind: float
     """Tailwind [m/s]."""
     lpv: LpvTables
     """The LPV aircraft."""
-    aircraft: AircraftTables
-    """The nonlinear aircraft."""
+    aircraft: AircraftTables | AircraftFrame
+    """The nonlinear aircraft where it flies; else what the frame reads of it."""
     nacelle: NacelleTables
     """Conversion actuator."""
     corridor: CorridorTables
@@ -230,10 +228,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     state.u[INPUT.gust_u] = gusts[G_U]
     state.u[INPUT.gust_w] = gusts[G_W]
     state.u[INPUT.gust_q] = gusts[G_Q]
-    if tables.plant == PLANT_LPV:
-        lpv_outputs(tables.lpv, x, state.u, angle, scratch.y, scratch.work)
-    else:
-        nonlinear.outputs(tables.aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
+    plant_outputs(tables.aircraft, tables.lpv, x, state.u, angle, (scratch.y, scratch.xdot, scratch.work))
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     through = x[STATE.u] * ct + x[STATE.w] * st
     airspeed = through + gusts[G_AHEAD]
@@ -517,11 +512,7 @@ def complete(
     fault_actuators_begin(
         tables.faults, state.faults, controls, x, (stick, lever), scratch.path[1, 0], power, dt, scratch.planned
     )
-    if tables.plant == PLANT_LPV:
-        lpv_step(tables.lpv, x, u, scratch.path, dt, scratch.work)
-        state.clock[CLOCK_FLAGS] = scratch.work[0]
-    else:
-        nonlinear.step(tables.aircraft, x, u, scratch.path, dt, scratch.work)
+    state.clock[CLOCK_FLAGS] = plant_step(tables.aircraft, tables.lpv, x, u, scratch.path, dt, scratch.work)
     fault_actuators_end(scratch.planned, x)
     after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
     state.clock[CLOCK_DISTANCE] += dt * (0.5 * (before + after) + tables.wind)

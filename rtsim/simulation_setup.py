@@ -25,6 +25,7 @@ from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
+from rtsim.plant_kernels import AircraftFrame
 from rtsim.programme import Programme
 from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.chain import compiled_law
@@ -135,12 +136,12 @@ def build_parts(setup: FlightSetup) -> Parts:
         )
     x[STATE.altitude] = altitude
     programme = setup.programme
+    own = nonlinear_aircraft.tables
     tables = kernels.SimulationTables(
-        plant=kernels.PLANT_NONLINEAR if setup.plant == "nonlinear" else kernels.PLANT_LPV,
         dt=1.0 / setup.rate_hz,
         wind=float(setup.wind),
         lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
-        aircraft=nonlinear_aircraft.tables,
+        aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
         nacelle=load_nacelle_tables(),
         corridor=load_corridor(setup.corridor).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),

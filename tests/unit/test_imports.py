@@ -21,6 +21,7 @@ LAYERS = (
     ("rtsim.lpv",),
     ("rtsim.nacelle",),
     ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),
+    ("rtsim.plant_kernels",),
     ("rtsim.simulation_kernels",),
     ("rtsim.simulation_setup",),
     ("rtsim.simulation",),
