@@ -23,7 +23,19 @@ EXIT_BROKEN_PIPE = 141
 EXIT_INTERRUPTED = 130
 EXIT_TERMINATED = 143
 
-COMMAND_MODULES = ("fly", "replay", "analysis", "corridor", "pilot", "model", "log", "check", "timing", "optimize")
+COMMAND_MODULES = (
+    "fly",
+    "replay",
+    "analysis",
+    "corridor",
+    "pilot",
+    "model",
+    "log",
+    "check",
+    "timing",
+    "optimize",
+    "joystick",
+)
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
 
 

@@ -125,7 +125,7 @@ class GamepadMap(_Strict):
     name: Annotated[str, Field(min_length=1, max_length=100)]
     """The device, for people."""
     match: list[Annotated[str, Field(min_length=2, max_length=100)]] = []
-    """Parts of the names under which the device shows up; capitals do not matter."""
+    """Parts of the names under which the device shows up, or whole names after ``=``; capitals do not matter."""
     axes: DeviceAxes
     """Its axes."""
     buttons: dict[DeviceFunction, _DeviceButton] = {}
@@ -202,9 +202,14 @@ def gamepad_map_for(device: str) -> tuple[str, GamepadMap] | None:
     """
     for name in map_names():
         found = load_stick_map(name)
-        if isinstance(found, GamepadMap) and any(part.lower() in device.lower() for part in found.match):
+        if isinstance(found, GamepadMap) and any(_matches(part, device) for part in found.match):
             return name, found
     return None
+
+
+def _matches(part: str, device: str) -> bool:
+    part, device = part.lower(), device.lower()
+    return part[1:] == device if part.startswith("=") else part in device
 
 
 def parse_stick_map(text: str, *, file: str) -> StickMap | InputError:
