@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from rtsim import simulation_kernels as kernels
 from rtsim.aids import AIDS, AidName
 from rtsim.aircraft.signals import INPUT, STATE
-from rtsim.atmosphere import Gust, Turbulence, add_gust, normals_needed, set_turbulence
+from rtsim.atmosphere import Gust, Turbulence
+from rtsim.atmosphere.air import add_gust, normals_needed, set_turbulence
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
-from rtsim.faults import Fault
+from rtsim.faults import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply, fault_nacelle_ok
+from rtsim.faults.schedule import fault_change
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
@@ -32,6 +34,8 @@ MODES: dict[PilotMode, int] = {
     "hold": kernels.MODE_HOLD,
 }
 """Pilot modes by name, with their number in the ``pilot_mode`` column."""
+Disturbance = Gust | Turbulence | FaultSwitch
+"""What can be done to a flight from outside besides its commands; each is a recorded event."""
 END_REASONS = {
     kernels.END_NONE: "",
     kernels.END_CRASH: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
@@ -42,7 +46,7 @@ END_REASONS = {
 }
 """Why a flight ended by itself, by the code in the simulation's clock."""
 
-__all__ = ["END_REASONS", "MODES", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
+__all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +55,7 @@ class Snapshot:
 
     state: kernels.SimulationState
     """Copies of every array the frame changes."""
-    random_stream: dict[str, object]
+    random_stream: dict[str, Any]
     """State of the generators of pilot noise and turbulence, and the noise drawn for this frame."""
     laws: ChainSnapshot | None = None
     """State of the protection laws written in Python; None where there is none."""
@@ -326,8 +330,26 @@ class Simulation:
         self._observe()
         airspeed = float(self._row[COLUMN.airspeed_kt]) * KNOT
         state, frequency = self._state, self.tables.nacelle.frequency
-        fault_apply(state.faults, fault.change(on=on, time=self.time), state.x, state.nacelle, frequency, airspeed)
+        fault_apply(
+            state.faults, fault_change(fault, on=on, time=self.time), state.x, state.nacelle, frequency, airspeed
+        )
         kernels.observe(self.tables, state, self._scratch, self._row)
+
+    def disturb(self, change: Disturbance) -> None:
+        """Change the air or let something fail or mend, from now on.
+
+        Args:
+            change: A gust, another severity of the turbulence, or a failure with whether it begins or ends.
+
+        Raises:
+            InputError: As many live gusts as fit are still acting.
+        """
+        if isinstance(change, Gust):
+            self.add_gust(change)
+        elif isinstance(change, Turbulence):
+            self.set_turbulence(change)
+        else:
+            self.set_fault(change.fault, on=change.on)
 
     def add_gust(self, gust: Gust) -> None:
         """Add a gust to the air ahead; it is felt from the frame after this one at the earliest.

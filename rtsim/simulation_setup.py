@@ -12,11 +12,13 @@ from rtsim.aids import AidName, design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
-from rtsim.atmosphere import AirSpecification, new_gust_state
+from rtsim.atmosphere import CALM, AirSpecification
+from rtsim.atmosphere.air import gust_tables, new_gust_state
 from rtsim.corridor import load_corridor
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
 from rtsim.errors import InputError
-from rtsim.faults import Fault, fault_tables, new_fault_state
+from rtsim.faults import Fault
+from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.frame import FloatArray
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.lpv_kernels import work_size
@@ -71,7 +73,7 @@ class FlightSetup:
     """Let the MOCM's observation and motor noise act."""
     aids: tuple[AidName, ...] = ()
     """Pilot aids on at frame 0; they act on every pilot but the MOCM."""
-    air: AirSpecification = AirSpecification()
+    air: AirSpecification = CALM
     """Gusts and turbulence."""
     faults: tuple[Fault, ...] = ()
     """Failures and their times."""
@@ -146,7 +148,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         corridor=load_corridor(setup.corridor).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
         aids=design_aids(database),
-        gusts=setup.air.tables(),
+        gusts=gust_tables(setup.air),
         faults=fault_tables(setup.faults),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
         protection=law_tables(

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from rtsim.errors import InputError
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
 from rtsim.units import deg, kt
+from scenarios.disturbances import air_of, disturbance_problems, faults_of
 from scenarios.metrics import METRIC_NAMES
 from scenarios.problems import closest, explain, suggestion
 from scenarios.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
@@ -153,6 +154,7 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
         found.append(InputError("is missing", file=file, key="duration_s", mend="add it: a hold has no end of its own"))
     if content.programme is not None:
         found += _point_contradictions(content.programme, file)
+    found += disturbance_problems(content.air, content.faults, file)
     for number, clause in enumerate(content.expect):
         key = f"expect[{number}]"
         if clause.metric not in METRIC_NAMES:
@@ -250,6 +252,8 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         wind=kt(options.wind_kt),
         pilot_noise=options.pilot_noise,
         aids=tuple(dict.fromkeys(options.aids)),
+        air=air_of(content.air),
+        faults=faults_of(content.faults),
         events=tuple(
             ScenarioEvent(event.time_s, event.pilot) for event in sorted(content.events, key=lambda event: event.time_s)
         ),

@@ -14,6 +14,7 @@ from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256
 from rtsim.simulation import MODES, Simulation
+from scenarios.disturbances import DISTURBANCE_KINDS, disturbance_from_event
 from scenarios.runner import setup_from_json, versions
 from telemetry.log_format import LogEvent
 from telemetry.log_reader import FlightLog, read_log
@@ -98,7 +99,7 @@ def fly_recording(simulation: Simulation, recorded: FloatArray, events: Sequence
     Returns:
         The replayed history, shape (rows flown, SIGNAL_COUNT).
     """
-    acting = [event for event in events if event.kind in {"reset", "pilot", "aid"}]
+    acting = [event for event in events if event.kind in {"reset", "pilot", "aid", *DISTURBANCE_KINDS}]
     replayed = np.empty_like(recorded)
     due = 0
     for row in range(len(recorded)):
@@ -154,6 +155,9 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
         for aid in AIDS:
             if aid == event.data["aid"]:
                 simulation.set_aid(aid, bool(event.data["on"]))
+        return
+    if event.kind in DISTURBANCE_KINDS:
+        simulation.disturb(disturbance_from_event(event.kind, event.data))
         return
     mode = str(event.data["mode"])
     for name in MODES:

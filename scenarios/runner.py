@@ -181,6 +181,8 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         seed=scenario.seed,
         pilot_noise=scenario.pilot_noise,
         aids=scenario.aids,
+        air=scenario.air,
+        faults=scenario.faults,
     )
 
 

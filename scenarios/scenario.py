@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rtsim.atmosphere import AirSpecification
+from rtsim.faults import Fault
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
 
@@ -98,6 +100,10 @@ class Scenario:
     """Whether the MOCM's motor and observation noise is on."""
     aids: tuple[AidName, ...]
     """Pilot aids on at the start; they act on every pilot but the MOCM."""
+    air: AirSpecification
+    """Gusts and turbulence."""
+    faults: tuple[Fault, ...]
+    """Failures and their times."""
     events: tuple[ScenarioEvent, ...]
     expectations: tuple[Expectation, ...]
     source: str

@@ -10,6 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
+from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
 from scenarios.scenario import AidName
 
 FORMAT = 1
@@ -79,6 +81,45 @@ class ProgrammeTable(Strict):
     climb_rate_m_s: ClimbRateMS = 2.0
 
 
+GustKt = Annotated[float, Field(ge=-60.0, le=60.0, allow_inf_nan=False)]
+
+
+class AirGustTable(Strict):
+    """One of ``[[air.gusts]]``: a discrete gust."""
+
+    time_s: DurationS
+    ahead_kt: GustKt = 0.0
+    below_kt: GustKt = 0.0
+    shape: GustShape = "one-minus-cosine"
+    duration_s: Annotated[float, Field(ge=0.0, le=3600.0, allow_inf_nan=False)] | None = None
+    length_m: Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)] | None = None
+    axes: GustAxes = "earth"
+
+
+class AirTable(Strict):
+    """``[air]``: turbulence and gusts; calm by default."""
+
+    turbulence: Severity | None = None
+    wind_at_20_ft_kt: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False)] | None = None
+    fade_in_s: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False)] = 2.0
+    minimum_speed_kt: Annotated[float, Field(ge=2.0, le=150.0, allow_inf_nan=False)] = 30.0
+    gusts: Annotated[list[AirGustTable], Field(max_length=1000)] = []
+
+
+class FaultTable(Strict):
+    """One of ``[[faults]]``: something fails, and perhaps mends."""
+
+    kind: FaultKind
+    time_s: DurationS
+    end_s: DurationS | None = None
+    actuator: Actuator | None = None
+    rate_deg_s: Annotated[float, Field(ge=0.0, le=200.0, allow_inf_nan=False)] | None = None
+    stop: Stop | None = None
+    bias_kt: Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)] | None = None
+    power_shp: Annotated[float, Field(ge=0.0, le=1802.0, allow_inf_nan=False)] | None = None
+    other_engine: EngineRating = "contingency"
+
+
 class EventTable(Strict):
     """One of ``[[events]]``: something that happens at a time."""
 
@@ -107,5 +148,7 @@ class ScenarioFile(Strict):
     flight: FlightTable = FlightTable()
     start: StartTable = StartTable()
     programme: ProgrammeTable | None = None
+    air: AirTable = AirTable()
+    faults: Annotated[list[FaultTable], Field(max_length=1000)] = []
     events: list[EventTable] = []
     expect: list[ExpectTable] = []

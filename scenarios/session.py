@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from rtsim.aids import AidName
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
+from rtsim.faults import fault_events
 from rtsim.frame import SIGNAL_COUNT, FloatArray
-from rtsim.simulation import END_REASONS, Simulation
+from rtsim.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.simulation_kernels import END_GENTLE_LANDING
+from scenarios.disturbances import disturbance_event
 from scenarios.hands import Hands, pilot_modes
 from scenarios.pilots import PilotFactory
 from scenarios.scenario import PilotMode, ScenarioEvent
@@ -65,6 +68,11 @@ class FlightSession:
         self._frames = frames
         self._due = [(max(0, math.ceil(event.time / simulation.dt - 1e-9)), event) for event in events]
         self._next_due = 0
+        self._failures = [
+            (max(0, math.ceil(event.time / simulation.dt - 1e-9)), event)
+            for event in fault_events(simulation.setup.faults)
+        ]
+        self._next_failure = 0
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
         self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
         self._hands = hands
@@ -104,6 +112,8 @@ class FlightSession:
         """
         if self._next_due < len(self._due):
             self._start_due_events()
+        if self._next_failure < len(self._failures):
+            self._tell_failures()
         simulation = self.simulation
         command = None
         hands = self._hands
@@ -132,6 +142,10 @@ class FlightSession:
             self._start_due_events()
         if self._next_due < len(self._due):
             frames = min(frames, self._due[self._next_due][0] - self.simulation.frame_index)
+        if self._next_failure < len(self._failures):
+            self._tell_failures()
+        if self._next_failure < len(self._failures):
+            frames = min(frames, self._failures[self._next_failure][0] - self.simulation.frame_index)
         if self._hands is None and (self._pilot is None or self.simulation.mode != "external"):
             rows = self.simulation.run(frames)
             self.rows += len(rows)
@@ -147,7 +161,7 @@ class FlightSession:
         """Put the aircraft, its pilot and the scenario's events back to the start."""
         self._tell("reset", "the flight starts again")
         self.simulation.reset()
-        self._next_due = 0
+        self._next_due = self._next_failure = 0
         if self._pilot_factory is not None:
             self._pilot = self._pilot_factory()
         if self._hands is not None:
@@ -178,6 +192,20 @@ class FlightSession:
             "is not a pilot of this flight", key="pilot", value=pilot, allowed=", ".join(available), mend="choose one"
         )
 
+    def disturb(self, change: Disturbance) -> None:
+        """Change the air, or let something fail or mend, from the coming frame on.
+
+        Args:
+            change: What happens; what cannot be done (no room for another gust) is told and changes nothing.
+        """
+        kind, text, data = disturbance_event(change)
+        try:
+            self.simulation.disturb(change)
+        except InputError as error:
+            self._tell("refused", str(error), level="warning")
+            return
+        self._tell(kind, text, data, level="info" if kind == "turbulence" else "warning")
+
     def switch_aid(self, name: AidName, *, on: bool) -> None:
         """Switch a pilot aid from the coming frame on.
 
@@ -196,6 +224,16 @@ class FlightSession:
             text: One line, for people.
         """
         self._tell(kind, text)
+
+    def _tell_failures(self) -> None:
+        """Record the failures of the scenario that begin or end with this frame; they act by themselves."""
+        frame = self.simulation.frame_index
+        while self._next_failure < len(self._failures) and self._failures[self._next_failure][0] <= frame:
+            event = self._failures[self._next_failure][1]
+            self._next_failure += 1
+            name, _, change = event.name.rpartition(" ")
+            text = f"{'failure' if change == 'on' else 'mended'}: {name.replace('-', ' ')}"
+            self._tell("scheduled_failure", text, {"name": event.name, "value": event.value}, level="warning")
 
     def _start_due_events(self) -> None:
         frame = self.simulation.frame_index
@@ -221,7 +259,7 @@ class FlightSession:
         self.switch_pilot("hold")
         return None
 
-    def _tell(self, kind: str, text: str, data: dict[str, str | int] | None = None, *, level: str = "info") -> None:
+    def _tell(self, kind: str, text: str, data: dict[str, Any] | None = None, *, level: str = "info") -> None:
         if self.on_event is not None:
             time = self.simulation.frame_index * self.dt
             details = {"row": self.rows, **(data or {})}

@@ -1,23 +1,8 @@
-"""Gusts and turbulence as inputs of the plant: discrete gusts and the Dryden forms of MIL-F-8785C."""
+"""Gusts and turbulence as inputs of the plant: discrete gusts and the Dryden forms of MIL-F-8785C.
 
-from rtsim.atmosphere.air import (
-    SEVERITY_WIND,
-    AirSpecification,
-    Gust,
-    Turbulence,
-    add_gust,
-    new_gust_state,
-    normals_needed,
-    set_turbulence,
-)
+The package itself hands out the data types only; tables and state are in ``rtsim.atmosphere.air``.
+"""
 
-__all__ = [
-    "SEVERITY_WIND",
-    "AirSpecification",
-    "Gust",
-    "Turbulence",
-    "add_gust",
-    "new_gust_state",
-    "normals_needed",
-    "set_turbulence",
-]
+from rtsim.atmosphere.specification import CALM, SEVERITY_WIND, AirSpecification, Gust, Turbulence
+
+__all__ = ["CALM", "SEVERITY_WIND", "AirSpecification", "Gust", "Turbulence"]

@@ -1,5 +1,8 @@
-"""Failures of nacelles, actuators, airspeed sensor and engine, scheduled or live."""
+"""Failures of nacelles, actuators, airspeed sensor and engine, scheduled or live.
 
-from rtsim.faults.fault import Fault, FaultEvent, fault_events, fault_tables, new_fault_state
+The package itself hands out the data types only; the schedule and the state are in ``rtsim.faults.schedule``.
+"""
 
-__all__ = ["Fault", "FaultEvent", "fault_events", "fault_tables", "new_fault_state"]
+from rtsim.faults.fault import Fault, FaultEvent, FaultSwitch, fault_events
+
+__all__ = ["Fault", "FaultEvent", "FaultSwitch", "fault_events"]

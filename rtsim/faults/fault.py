@@ -1,18 +1,13 @@
-"""Failures as data: what breaks, when, how badly, and whether it mends."""
+"""Failures as data: what breaks, when, how badly, and whether it mends. Loads no compiled code."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
-
-import numpy as np
+from typing import Literal, get_args
 
 from rtsim.errors import InputError
-from rtsim.faults import fault_kernels as kernels
-from rtsim.faults.fault_kernels import FaultTables
-from rtsim.frame import FloatArray
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
 FaultKind = Literal[
@@ -29,17 +24,6 @@ Actuator = Literal["collective", "cyclic", "elevator"]
 Stop = Literal["low", "high"]
 EngineRating = Literal["contingency", "takeoff", "military", "normal"]
 
-KINDS: dict[FaultKind, int] = {
-    "nacelle-jammed": kernels.KIND_NACELLE_JAMMED,
-    "nacelle-slow": kernels.KIND_NACELLE_SLOW,
-    "actuator-stuck": kernels.KIND_STUCK,
-    "actuator-slow": kernels.KIND_SLOW,
-    "actuator-hard-over": kernels.KIND_HARD_OVER,
-    "airspeed-bias": kernels.KIND_AIRSPEED_BIAS,
-    "airspeed-frozen": kernels.KIND_AIRSPEED_FROZEN,
-    "engine-limit": kernels.KIND_ENGINE_LIMIT,
-}
-"""Failures by name, with their number in the kernels."""
 ACTUATORS: tuple[Actuator, ...] = ("collective", "cyclic", "elevator")
 """Actuators that can fail, in the order of the aircraft's states."""
 ENGINE_RATING: dict[EngineRating, float] = {
@@ -51,14 +35,6 @@ ENGINE_RATING: dict[EngineRating, float] = {
 """Power of one LTC1K-4K engine by rating [W] (NASA TM X-62407)."""
 TRANSMISSION_EFFICIENCY = 0.93
 """Shaft power of the rotors over engine power (NASA TM X-62407)."""
-HARD_OVER_RATE = 20.0 * DEGREE
-"""Rate of a hard-over that gives none [rad/s]: assumed, the XV-15's actuator rates are not published."""
-GOVERNOR_FREQUENCY = 3.0
-"""How fast the governor takes collective off [rad/s]: assumed, half the bandwidth of the collective's actuator."""
-POWER_PER_COLLECTIVE = 200.0 * HORSEPOWER / DEGREE
-"""Shaft power of both rotors per collective without axial flow [W/rad]; fitted to the database, docs/faults.md."""
-POWER_PER_COLLECTIVE_SPEED = 7.5 * HORSEPOWER / DEGREE / KNOT
-"""Its growth with the airspeed along the mast [W s/(rad m)]; fitted likewise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +62,7 @@ class Fault:
 
     def __post_init__(self) -> None:
         """Refuse what is out of range, missing or without meaning (:class:`InputError`)."""
-        _choice("kind", self.kind, tuple(KINDS))
+        _choice("kind", self.kind, get_args(FaultKind))
         _within("start", self.start, 0.0, 36_000.0, "s")
         if self.end is not None and not (math.isfinite(self.end) and self.end > self.start):
             raise InputError("is not after start", key="end", value=self.end, allowed=f"above {self.start:g} s")
@@ -136,16 +112,15 @@ class Fault:
                 return number
         return 0.0
 
-    def change(self, *, on: bool, time: float) -> FloatArray:
-        """Give the row of a schedule that lets it begin or end.
 
-        Args:
-            on: Begins; else ends.
-            time: When [s].
-        """
-        channel = 0 if self.actuator is None else ACTUATORS.index(self.actuator)
-        rate = self.rate if self.kind == "actuator-hard-over" and self.rate is not None else HARD_OVER_RATE
-        return np.array([time, KINDS[self.kind], channel, self.value, rate, 1.0 if on else 0.0])
+@dataclass(frozen=True, slots=True)
+class FaultSwitch:
+    """A failure that begins or ends by hand, whatever its times say."""
+
+    fault: Fault
+    """The failure."""
+    on: bool
+    """Begins; else ends."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,36 +142,17 @@ def fault_events(faults: Sequence[Fault]) -> tuple[FaultEvent, ...]:
         faults: The failures.
     """
     return tuple(
-        FaultEvent(time, f"{fault.name} {'on' if on else 'off'}", fault.value) for time, fault, on in _changes(faults)
+        FaultEvent(time, f"{fault.name} {'on' if on else 'off'}", fault.value)
+        for time, fault, on in fault_changes(faults)
     )
 
 
-def fault_tables(faults: Sequence[Fault]) -> FaultTables:
-    """Give the tables that the kernels read.
+def fault_changes(faults: Sequence[Fault]) -> list[tuple[float, Fault, bool]]:
+    """Give all changes in time, with whether they begin; at one time what ends goes before what begins, then as listed.
 
     Args:
-        faults: The failures of a flight, in any order.
+        faults: The failures.
     """
-    schedule = np.zeros((0, kernels.SCHEDULE_COLUMNS))
-    changes = _changes(faults)
-    if changes:
-        schedule = np.stack([fault.change(on=on, time=time) for time, fault, on in changes])
-    schedule.setflags(write=False)
-    return FaultTables(
-        schedule=schedule,
-        governor_frequency=GOVERNOR_FREQUENCY,
-        power_per_collective=POWER_PER_COLLECTIVE,
-        power_per_collective_speed=POWER_PER_COLLECTIVE_SPEED,
-    )
-
-
-def new_fault_state() -> FloatArray:
-    """Give the fault state of a sound aircraft, shape (FAULT_STATE_SIZE,)."""
-    return np.zeros(kernels.FAULT_STATE_SIZE)
-
-
-def _changes(faults: Sequence[Fault]) -> list[tuple[float, Fault, bool]]:
-    """All changes in time; at one time what ends goes before what begins, then as listed."""
     changes = [(fault.start, fault, True) for fault in faults]
     changes += [(fault.end, fault, False) for fault in faults if fault.end is not None]
     return sorted(changes, key=lambda change: (change[0], change[2]))

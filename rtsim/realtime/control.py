@@ -6,11 +6,16 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from rtsim.errors import InputError
 
-Action = Literal["pause", "resume", "toggle-pause", "step", "speed", "faster", "slower", "reset", "pilot", "stop"]
+if TYPE_CHECKING:
+    from rtsim.simulation import Disturbance
+
+Action = Literal[
+    "pause", "resume", "toggle-pause", "step", "speed", "faster", "slower", "reset", "pilot", "disturb", "stop"
+]
 
 WARP_STEPS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """Speeds that the keys ``+`` and ``-`` walk through, in multiples of real time."""
@@ -27,6 +32,8 @@ class Request:
     """Frames to step, or the new speed."""
     text: str = ""
     """Who shall fly, or why to stop."""
+    change: Disturbance | None = None
+    """What shall happen to the air or the aircraft."""
 
 
 class FlightControl:
@@ -95,6 +102,14 @@ class FlightControl:
             pilot: ``mocm``, ``external`` or ``hold``, or ``next`` for the next one that is available.
         """
         self.requests.append(Request("pilot", text=pilot))
+
+    def disturb(self, change: Disturbance) -> None:
+        """Change the air, or let something fail or mend.
+
+        Args:
+            change: A gust, another severity of the turbulence, or a failure with whether it begins or ends.
+        """
+        self.requests.append(Request("disturb", change=change))
 
     def stop(self, reason: str = "stopped by the user") -> None:
         """End the flight cleanly after the frame that is being flown.

@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from rtsim.realtime.clock import wait_until
 from rtsim.realtime.control import FlightControl, Request, checked_speed, neighbouring_warp
 from rtsim.realtime.policy import OverrunPolicy
 from rtsim.realtime.report import Ending, Spread, TimingLog, TimingReport, microseconds
+
+if TYPE_CHECKING:
+    from rtsim.simulation import Disturbance
 
 _NAMES = [signal.name for signal in TIMING_SIGNALS]
 _LATENESS, _WORK, _WORK_CPU, _OVERRUNS = (
@@ -84,6 +87,14 @@ class FrameSource(Protocol):
 
         Args:
             pilot: A mode's name, or ``next``.
+        """
+        ...
+
+    def disturb(self, change: Disturbance) -> None:
+        """Change the air, or let something fail or mend.
+
+        Args:
+            change: What happens.
         """
         ...
 
@@ -266,6 +277,8 @@ class Executive:
             self._reschedule()
         elif action == "pilot":
             self.source.switch_pilot(request.text)
+        elif action == "disturb" and request.change is not None:
+            self.source.disturb(request.change)
         elif action == "stop":
             self._ending, self._stop_reason = "stopped", request.text
 

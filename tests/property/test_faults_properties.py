@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtsim.aircraft import STATE, STATES, Xv15
-from rtsim.faults import Fault, fault_events, fault_tables, new_fault_state
+from rtsim.faults import Fault, fault_events
 from rtsim.faults import fault_kernels as kernels
 from rtsim.faults.fault import ACTUATORS
+from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.units import deg
 
 AIRCRAFT = Xv15.load().tables

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from scipy import linalg, signal
 
-from rtsim.atmosphere import AirSpecification, Turbulence, new_gust_state, set_turbulence
+from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.atmosphere import dryden_kernels as dryden
+from rtsim.atmosphere.air import gust_tables, new_gust_state, set_turbulence
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, G_Q, gust_step
 from rtsim.atmosphere.spectra import longitudinal_spectrum, pitch_spectrum, vertical_spectrum
 from rtsim.errors import InputError
@@ -25,7 +26,7 @@ from rtsim.units import FOOT, KNOT, ft, kt
 DT = 0.004
 SPAN = 32.17 * FOOT
 MODERATE = AirSpecification(turbulence=Turbulence(wind_at_20_ft=kt(30.0), fade_in=0.0))
-TABLES = MODERATE.tables()
+TABLES = gust_tables(MODERATE)
 
 
 @numba.njit
@@ -42,7 +43,7 @@ def fly(air, *, speed, altitude, seconds, seed, dt=DT):
     random = np.random.default_rng(seed)
     state = new_gust_state(air, random.standard_normal(3))
     history = random.standard_normal((round(seconds / dt), 3))
-    loop(air.tables(), state, np.full(len(history), speed), np.full(len(history), altitude), dt, history)
+    loop(gust_tables(air), state, np.full(len(history), speed), np.full(len(history), altitude), dt, history)
     return history
 
 

@@ -10,9 +10,10 @@ import pytest
 from rtsim.aircraft import INPUT, OUTPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.errors import InputError
-from rtsim.faults import Fault, FaultEvent, fault_events, fault_tables, new_fault_state
+from rtsim.faults import Fault, FaultEvent, fault_events
 from rtsim.faults import fault_kernels as kernels
-from rtsim.faults.fault import ENGINE_RATING, HARD_OVER_RATE
+from rtsim.faults.fault import ENGINE_RATING
+from rtsim.faults.schedule import HARD_OVER_RATE, fault_tables, new_fault_state
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, new_actuator_state
 from rtsim.units import HORSEPOWER, deg, kt

@@ -7,17 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from rtsim.atmosphere import (
-    AirSpecification,
-    Gust,
-    Turbulence,
-    add_gust,
-    new_gust_state,
-    normals_needed,
-    set_turbulence,
-)
+from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.atmosphere import gust_kernels as kernels
-from rtsim.atmosphere.air import LIVE_SLOTS
+from rtsim.atmosphere.air import LIVE_SLOTS, add_gust, gust_tables, new_gust_state, normals_needed, set_turbulence
 from rtsim.errors import InputError
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, seed_sequence, stream_generator
 from rtsim.units import deg, kt
@@ -27,7 +19,7 @@ NO_NORMALS = np.zeros(0)
 
 
 def fly(air, *, seconds, speed=50.0, pitch=0.0):
-    tables, state = air.tables(), new_gust_state(air)
+    tables, state = gust_tables(air), new_gust_state(air)
     out = np.empty(3)
     history = []
     for k in range(round(seconds / DT) + 1):
@@ -127,7 +119,7 @@ def test_no_gust_is_exactly_no_gust(air):
 def test_busy_says_when_a_frame_may_leave_the_gusts_out():
     air = AirSpecification(gusts=(Gust(start=0.5, ahead=1.0, duration=0.5),))
     assert new_gust_state(AirSpecification())[kernels.G_BUSY] == 0.0
-    tables, state, out = air.tables(), new_gust_state(air), np.empty(3)
+    tables, state, out = gust_tables(air), new_gust_state(air), np.empty(3)
     busy = [state[kernels.G_BUSY]]
     for time in (0.0, 0.6, 1.1, 1.2):
         kernels.gust_step(tables, state, 50.0, 100.0, 0.0, time, DT, NO_NORMALS, out)
@@ -151,7 +143,7 @@ def test_gusts_add_up():
 
 def test_a_live_gust_is_felt_from_the_next_step():
     air = AirSpecification()
-    tables, state = air.tables(), new_gust_state(air)
+    tables, state = gust_tables(air), new_gust_state(air)
     out = np.empty(3)
     kernels.gust_step(tables, state, 50.0, 100.0, 0.0, 1.0, DT, NO_NORMALS, out)
     add_gust(state, Gust(start=1.0, ahead=4.0, duration=0.0, shape="ramp"))
@@ -161,7 +153,7 @@ def test_a_live_gust_is_felt_from_the_next_step():
 
 def test_room_for_live_gusts_is_finite_and_given_back():
     air = AirSpecification(gusts=(Gust(start=0.0, ahead=1.0, duration=1.0, shape="build-up"),))
-    tables, state = air.tables(), new_gust_state(air)
+    tables, state = gust_tables(air), new_gust_state(air)
     pulse = Gust(start=0.0, ahead=1.0, duration=0.1)
     for _ in range(LIVE_SLOTS):
         add_gust(state, pulse)
