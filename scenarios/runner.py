@@ -30,6 +30,7 @@ from scenarios.options import Overrides, refuse_unavailable, with_overrides
 from scenarios.pilots import load_pilot
 from scenarios.record import FlightRecord, judge
 from scenarios.scenario import Scenario
+from scenarios.script_hands import ScriptHands
 from scenarios.session import FlightSession
 from scenarios.sinks import FlightSinks
 from telemetry.corridor_outline import CorridorOutline
@@ -119,6 +120,7 @@ def fly(
             pilot_factory=pilot_factory,
             pilot_name=scenario.pilot,
             hands=hands,
+            script=ScriptHands(scenario.pulses) if scenario.pulses else None,
         )
         log = _start_log(scenario, simulation, outputs, live=live)
         sinks = FlightSinks(
@@ -135,6 +137,7 @@ def fly(
             view.wait_ready(VIEW_PATIENCE_S)
         if link is not None:
             link.wait_ready()
+            _tell_where(link, outputs)
         executive = Executive(
             session, sinks, control=control, speed=math.inf if speed == "max" else speed, policy=policy
         )
@@ -287,6 +290,12 @@ def _start_mavlink(scenario: Scenario, outputs: FlightOutputs, *, live: bool) ->
     if warning is not None and outputs.on_message is not None:
         outputs.on_message(warning)
     return MavlinkLink(config)
+
+
+def _tell_where(link: MavlinkLink, outputs: FlightOutputs) -> None:
+    if outputs.on_message is not None:
+        targets = ", ".join(str(target) for target in link.config.targets)
+        outputs.on_message(f"MAVLink: sends to {targets}, receives on {link.config.bind_host}:{link.port}.")
 
 
 def _event_listener(outputs: FlightOutputs, link: MavlinkLink | None) -> Callable[[LogEvent], None] | None:

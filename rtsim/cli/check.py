@@ -1,7 +1,8 @@
-"""``rtsim check``: validates scenario files and databases without flying them."""
+"""``rtsim check``: validates scenario files, stick maps and databases without flying them."""
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Annotated
 
@@ -24,11 +25,13 @@ def register(app: typer.Typer) -> None:
 
 
 def check_command(
-    files: Annotated[list[str], typer.Argument(help="Scenario files (.toml), library names, databases (.nc, .mat).")],
+    files: Annotated[
+        list[str], typer.Argument(help="Scenarios and stick maps (.toml), library names, databases (.nc, .mat).")
+    ],
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Validate scenario files and databases; every mistake is one sentence, exit 2 where there is any.
+    """Validate scenario files, stick maps and databases; every mistake is one sentence, exit 2 where there is any.
 
     Args:
         files: What to check.
@@ -74,7 +77,28 @@ def file_problems(name: str) -> list[str]:
         return [
             str(InputError("is no kind of file that rtsim reads", file=name, allowed=", ".join(choices), mend=mend))
         ]
+    if suffix == ".toml" and _is_stick_map(Path(name)):
+        return _stick_map_problems(name)
     return [str(problem) for problem in scenario_problems(name)]
+
+
+def _is_stick_map(path: Path) -> bool:
+    """Whether a TOML file says that it is a stick map; scenarios have no ``kind``."""
+    try:
+        with path.open("rb") as file:
+            return "kind" in tomllib.load(file)
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
+        return False  # the scenario reader tells what is wrong
+
+
+def _stick_map_problems(name: str) -> list[str]:
+    from telemetry.joystick.stick_map import load_stick_map
+
+    try:
+        load_stick_map(Path(name))
+    except InputError as error:
+        return [str(error)]
+    return []
 
 
 def _database_problems(path: Path) -> list[str]:

@@ -6,7 +6,7 @@ import math
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -211,10 +211,23 @@ def summarize(record: FlightRecord, *, first_frame_s: float | None) -> None:
             f"work p99 {work.p99:.0f} us wall, {cpu.p99:.0f} us CPU; overruns {timing.overruns}; "
             f"drift {timing.drift_frames:.2f} frames",
         )
+    if record.mavlink is not None:
+        say(_sticks(record.mavlink))
     for verdict in record.verdicts:
         mark, style = ("held  ", None) if verdict.held else ("FAILED", "bold red")
         say(f"  {mark} {verdict.name}{_measured(verdict.value, verdict.limit)}", style=style)
     say(f"History {record.history_sha256}")
+
+
+def _sticks(mavlink: Mapping[str, Any]) -> str:
+    """How MAVLink went, in one line."""
+    age = mavlink["input_age_ms"]
+    if age is None:
+        return f"MAVLink: no sticks; {mavlink['sent']} messages sent"
+    return (
+        f"MAVLink: {mavlink['inputs']} stick inputs, age when used p50 {age['p50']:.1f} ms, p99 {age['p99']:.1f} ms, "
+        f"max {age['max']:.1f} ms; {mavlink['sent']} messages sent"
+    )
 
 
 def _print_metrics(summary: dict[str, Any]) -> None:
