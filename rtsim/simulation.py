@@ -111,7 +111,7 @@ class Simulation:
     @property
     def finished(self) -> bool:
         """The flight ended by itself; ``end_reason`` says why."""
-        return self._state.clock[kernels.CLOCK_END] != kernels.END_NONE
+        return bool(self._state.clock[kernels.CLOCK_END] != kernels.END_NONE)
 
     @property
     def end_reason(self) -> str:

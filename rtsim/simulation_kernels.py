@@ -265,7 +265,9 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.climb_rate_m_s] = climb
     row[COLUMN.distance_m] = state.clock[CLOCK_DISTANCE]
     row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(through), 1.0)) / DEGREE
-    row[COLUMN.angle_of_attack_deg] = math.atan2(x[STATE.w] + 4.5 * st, x[STATE.u] + 4.5 * ct) / DEGREE
+    row[COLUMN.angle_of_attack_deg] = (
+        math.atan2(x[STATE.w] + gusts[G_W] + 4.5 * st, x[STATE.u] + gusts[G_U] + 4.5 * ct) / DEGREE
+    )
     row[COLUMN.pitch_rate_deg_s] = x[STATE.q] / DEGREE
     row[COLUMN.body_u_m_s] = x[STATE.u]
     row[COLUMN.body_w_m_s] = x[STATE.w]
@@ -501,9 +503,7 @@ def complete(
 
     if state.clock[CLOCK_MODE] == MODE_MOCM:
         scalars = (angle, scratch.motion[1], dt)
-        mocm_advance_in(
-            tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, noise, scratch.pilot
-        )
+        mocm_advance_in(tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, noise, scratch.pilot)
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = stick
     u[INPUT.lever] = lever

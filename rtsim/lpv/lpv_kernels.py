@@ -143,7 +143,7 @@ def lpv_derivative(
     inputs_end = W_BLEND + tables.roles[R_STATES] + tables.roles[R_INPUTS]
     block = tables.cells.shape[3]
     sums, scratch = rows_at(tables), scratch_at(tables)
-    i, j = locate(tables, x, nacelle_angle, work)
+    i, j = locate(tables, x, u, nacelle_angle, work)
     blend(tables.cells, i, j, block, work, work[W_BLEND : W_BLEND + block])
     _apply(
         tables,
@@ -176,7 +176,7 @@ def lpv_outputs(
     inputs = roles[R_INPUTS]
     outputs = roles[R_OUTPUTS]
     rows = roles[R_OUTPUT_ROWS]
-    i, j = locate(tables, x, nacelle_angle, work)
+    i, j = locate(tables, x, u, nacelle_angle, work)
     block = tables.output_cells.shape[3]
     model = work[W_BLEND : W_BLEND + max(block, states + inputs)]
     blend(tables.cells, i, j, states + inputs, work, model)
@@ -242,7 +242,7 @@ def lpv_step(
         total[k] = 0.0
     work[W_FLAGS] = 0.0
     if refresh == REFRESH_ONCE:
-        i, j = locate(tables, x, nacelle_path[1, 0], work)
+        i, j = locate(tables, x, u, nacelle_path[1, 0], work)
         blend(tables.cells, i, j, block, work, model)
     for stage in range(4):
         row = (stage + 1) // 2
@@ -251,7 +251,7 @@ def lpv_step(
         if acceleration >= 0:
             stage_u[acceleration] = nacelle_path[row, 2]
         if refresh != REFRESH_ONCE:
-            i, j = locate(tables, stage_x, nacelle_path[row, 0], work)
+            i, j = locate(tables, stage_x, stage_u, nacelle_path[row, 0], work)
             whole = refresh == REFRESH_EVERY_STAGE or stage == 0
             blend(tables.cells, i, j, block if whole else states + inputs + row_sums.shape[0], work, model)
         _apply(tables, stage_x, stage_u, slope, reference, columns, deviation, row_sums)

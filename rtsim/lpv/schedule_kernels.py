@@ -66,7 +66,9 @@ R_OUTPUTS = 11
 R_ROWS = 12
 R_OUTPUT_ROWS = 13
 R_REFRESH = 14
-R_COUNT = 15
+R_GUST_U = 15
+R_GUST_W = 16
+R_COUNT = 17
 
 # positions in the work array; the sections after the last are laid out by `work_size`
 W_FLAGS = 0
@@ -196,12 +198,18 @@ def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
 
 
 @inner_kernel
-def locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatArray) -> tuple[int, int]:
+def locate(
+    tables: LpvTables, x: FloatArray, inputs: FloatArray, nacelle_angle: float, work: FloatArray
+) -> tuple[int, int]:
     """Find the cell of the present state: corner weights, layer shares and flags into ``work``.
+
+    The forms whose aerodynamics stand alone are scheduled by the motion through the air, gusts included: the tail's
+    tables are curved, and a gust of 3 m/s at 40 kn would otherwise pitch the aircraft by 2 deg too much.
 
     Args:
         tables: Prepared tables.
         x: Total state (nx,).
+        inputs: Total input (nu,); its gusts count, where the form knows them.
         nacelle_angle: Nacelle angle [rad].
         work: Scratch of ``work_size(tables)`` values.
 
@@ -211,6 +219,10 @@ def locate(tables: LpvTables, x: FloatArray, nacelle_angle: float, work: FloatAr
     roles = tables.roles
     u = x[roles[R_U]]
     w = x[roles[R_W]]
+    if roles[R_GUST_U] >= 0:
+        u += inputs[roles[R_GUST_U]]
+    if roles[R_GUST_W] >= 0:
+        w += inputs[roles[R_GUST_W]]
     pitch = x[roles[R_PITCH]]
     sine = math.sin(pitch)
     cosine = math.cos(pitch)

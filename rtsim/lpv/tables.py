@@ -11,7 +11,14 @@ from rtsim.errors import InputError
 from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.schedule_kernels import LpvTables
-from rtsim.lpv.variables import NACELLE_INPUTS, RIGID_BODY_STATES, SCHEDULING_STATES, position, required_position
+from rtsim.lpv.variables import (
+    GUST_INPUTS,
+    NACELLE_INPUTS,
+    RIGID_BODY_STATES,
+    SCHEDULING_STATES,
+    position,
+    required_position,
+)
 from rtsim.units import GRAVITY
 
 FloatArray = npt.NDArray[np.float64]
@@ -128,6 +135,9 @@ def _roles(database: Database, form: int, level: int) -> npt.NDArray[np.int64]:
     motion = (kernels.R_NACELLE_RATE, kernels.R_NACELLE_ACCELERATION)
     for place, name in zip(motion, NACELLE_INPUTS, strict=True):
         roles[place] = position(database.inputs, name)
+    for place, name in zip((kernels.R_GUST_U, kernels.R_GUST_W), GUST_INPUTS, strict=True):
+        # The paper's plain form is scheduled by the state alone.
+        roles[place] = -1 if form == kernels.FORM_PLAIN else position(database.inputs, name)
     roles[kernels.R_STATES] = len(database.states)
     roles[kernels.R_INPUTS] = len(database.inputs)
     roles[kernels.R_OUTPUTS] = len(database.outputs)

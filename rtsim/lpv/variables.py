@@ -8,6 +8,7 @@ from rtsim.aircraft.signals import Variable
 from rtsim.errors import InputError
 
 __all__ = [
+    "GUST_INPUTS",
     "NACELLE_INPUTS",
     "RIGID_BODY_STATES",
     "SCHEDULING_STATES",
@@ -22,6 +23,8 @@ RIGID_BODY_STATES = ("u", "w", "q", "pitch", "altitude")
 """States that the stitched forms need besides: their gravity, Coriolis and kinematic terms are nonlinear."""
 NACELLE_INPUTS = ("nacelle_rate", "nacelle_acceleration")
 """Inputs that the step fills from the nacelle path where the database has them."""
+GUST_INPUTS = ("gust_u", "gust_w")
+"""Inputs that add to u and w in the aerodynamics, and so in the scheduling of the forms where these stand alone."""
 
 
 def position(variables: Sequence[Variable], name: str) -> int:

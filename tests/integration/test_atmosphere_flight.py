@@ -106,20 +106,28 @@ def test_what_a_gust_does_at_once(plant):
     assert row[at, COLUMN.ground_speed_kt] == calm[at, COLUMN.ground_speed_kt]
 
 
-@pytest.mark.parametrize(("airspeed", "nacelle"), [(120.0, 50.0), (150.0, 0.0)])
-def test_lpv_and_nonlinear_plant_answer_a_gust_alike(airspeed, nacelle):
-    """The linearized gust inputs against the model they come from, in gusts small enough to be linear (docs)."""
-    air = AirSpecification(gusts=(Gust(start=0.2, below=1.0, duration=1.0), Gust(start=0.4, ahead=1.0, duration=1.0)))
-    histories = []
-    for plant in ("lpv", "nonlinear"):
-        calm = Simulation(hold(airspeed, nacelle, plant=plant)).run(500)
-        gusty = Simulation(hold(airspeed, nacelle, plant=plant, air=air)).run(500)
-        histories.append(gusty - calm)
-    lpv, nonlinear = histories
-    for name in ("load_factor", "pitch_deg", "climb_rate_m_s", "longitudinal_flapping_deg", "pitch_rate_deg_s"):
+@pytest.mark.parametrize(
+    ("airspeed", "nacelle"), [(0.0, 90.0), (40.0, 85.0), (80.0, 75.0), (120.0, 50.0), (150.0, 0.0)]
+)
+@pytest.mark.parametrize("component", ["ahead", "below"])
+@pytest.mark.parametrize("size", [3.0, -3.0])
+def test_lpv_and_nonlinear_plant_answer_a_gust_alike(airspeed, nacelle, component, size):
+    """Bands of LPV against nonlinear model as over Table 1 (0.5 m, 0.4 deg, 0.15 deg flapping), in a gust of 3 m/s.
+
+    At 40 kn and 85 deg the tail's tables are so curved that gusts acting through constant matrices miss by 2 deg.
+    """
+    air = AirSpecification(gusts=(Gust(start=0.2, duration=1.0, **{component: size}),))
+    lpv, nonlinear = (
+        Simulation(hold(airspeed, nacelle, plant=plant, air=air)).run(500)
+        - Simulation(hold(airspeed, nacelle, plant=plant)).run(500)
+        for plant in ("lpv", "nonlinear")
+    )
+    bands = {"altitude_m": 0.5, "pitch_deg": 0.4, "longitudinal_flapping_deg": 0.15, "load_factor": 0.02}
+    for name, band in bands.items():
         column = getattr(COLUMN, name)
-        size = np.abs(nonlinear[:, column]).max()
-        assert np.abs(lpv[:, column] - nonlinear[:, column]).max() < 0.15 * size, name
+        assert np.sqrt(np.mean((lpv - nonlinear)[:, column] ** 2)) < band, name
+    # Each gust is felt: without one the comparison would say nothing.
+    assert np.abs(nonlinear[:, [COLUMN.load_factor, COLUMN.pitch_deg]]).max() > 0.03
 
 
 @pytest.mark.parametrize(

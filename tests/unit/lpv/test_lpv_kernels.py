@@ -34,6 +34,14 @@ class NumpyLpv:
         headwind = ALPHA_SPEED + np.where(u * cosine + w * sine < 0.0, -(u * cosine + w * sine), 0.0)
         return np.arctan2(w + headwind * sine, u + headwind * cosine)
 
+    def through_air(self, x, u):
+        """The state that schedules: with the gusts, except in the plain form."""
+        y = x.copy()
+        if self.form != "plain":
+            y[self.iu] += u[GUST_U]
+            y[self.iw] += u[GUST_W]
+        return y
+
     def corners(self, x, nacelle):
         airspeed = x[self.iu] * np.cos(x[self.ip]) + x[self.iw] * np.sin(x[self.ip])
         result, weights = [], []
@@ -94,8 +102,8 @@ class NumpyLpv:
         return J
 
     def derivative(self, x, u, nacelle):
-        corners = self.corners(x, nacelle)
-        shares = self.shares(x, corners)
+        corners = self.corners(self.through_air(x, u), nacelle)
+        shares = self.shares(self.through_air(x, u), corners)
         dx = x - self.interpolated("x_ref", shares, corners)
         du = u - self.interpolated("u_ref", shares, corners)
         dx[self.ih] = 0.0
@@ -114,8 +122,8 @@ class NumpyLpv:
         return f if self.form == "plain" else f + self.rigid_body(x)
 
     def outputs(self, x, u, nacelle):
-        corners = self.corners(x, nacelle)
-        shares = self.shares(x, corners)
+        corners = self.corners(self.through_air(x, u), nacelle)
+        shares = self.shares(self.through_air(x, u), corners)
         dx = x - self.interpolated("x_ref", shares, corners)
         du = u - self.interpolated("u_ref", shares, corners)
         dx[self.ih] = 0.0
@@ -136,7 +144,7 @@ class NumpyLpv:
 
 
 FORMS = ("layered", "stitched", "plain")
-RATE, ACCELERATION = 2, 3  # positions in the toy's inputs
+RATE, ACCELERATION, GUST_U, GUST_W = 2, 3, 4, 5  # positions in the toy's inputs
 
 
 def flight_state(database, rng, spread=1.0):
@@ -146,6 +154,7 @@ def flight_state(database, rng, spread=1.0):
         [0.05, 0.03, 2.0, 1.0, 0.05, 30.0, 0.02, 0.02]
     )
     u = database.u_ref[layer, i, j] + spread * 0.05 * rng.normal(size=len(database.inputs))
+    u[[GUST_U, GUST_W]] = spread * 2.0 * rng.normal(size=2)
     nacelle = np.clip(database.nacelle[j] + 0.05 * rng.normal(), 0.0, np.pi / 2)
     return x, u, float(nacelle)
 
