@@ -119,9 +119,13 @@ class Station:
             self.poll()
             time.sleep(0.002)
 
-    def wait_for_flight(self):
-        # The kernels may have to be compiled first.
-        self.wait_for(lambda: "ATTITUDE" in self.last and "RC_CHANNELS" in self.last and self.values, 150.0)
+    def wait_for_flight(self, flight):
+        def flies():
+            if flight.process.poll() is not None:
+                pytest.fail(flight.process.communicate()[1])
+            return "ATTITUDE" in self.last and "RC_CHANNELS" in self.last and self.values
+
+        self.wait_for(flies, 150.0)  # the kernels may have to be compiled first
 
     def since(self, name, moment):
         return [(at, message) for at, message in self.heard if message.get_type() == name and at >= moment]
@@ -191,7 +195,7 @@ class ScriptedHand:
 @pytest.mark.slow
 def test_a_hand_flies_out_and_back_and_lands_and_the_log_replays(start, station):
     flight = start(station.port, "--speed", "3", "--altitude-m", "40", "--duration", "400")
-    station.wait_for_flight()
+    station.wait_for_flight(flight)
     hand = ScriptedHand((station.last["RC_CHANNELS"].chan3_raw - 1000) / 1000.0, 40.0)
     phases, before = [], station.last["ATTITUDE"].time_boot_ms
     end = time.monotonic() + 150.0
@@ -234,7 +238,7 @@ def test_a_hand_flies_out_and_back_and_lands_and_the_log_replays(start, station)
 
 def test_sticks_reach_the_aircraft_at_once_and_their_loss_is_handled(start, station):
     flight = start(station.port, "--duration", "60")
-    station.wait_for_flight()
+    station.wait_for_flight(flight)
     lever = station.last["RC_CHANNELS"].chan3_raw - 1000
     station.hold(1.0, z=lever)
     begin = time.monotonic()
@@ -298,7 +302,7 @@ print(sent)
 @pytest.mark.parametrize("kind", ["garbage", "heartbeats", "sticks", "lists"])
 def test_a_flood_of_20000_packets_a_second_matters_to_nobody(start, station, kind):
     flight = start(station.port, "--duration", "60")
-    station.wait_for_flight()
+    station.wait_for_flight(flight)
     lever = station.last["RC_CHANNELS"].chan3_raw - 1000
     station.hold(1.0, z=lever)
     flood = subprocess.Popen(
