@@ -23,8 +23,9 @@ from rtsim.realtime import Executive, FlightControl, OverrunPolicy
 from rtsim.realtime.report import TimingReport
 from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import to_deg, to_kt
-from scenarios.hands import Hands, MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
+from scenarios.hands import Hands
 from scenarios.loader import load_scenario
+from scenarios.mavlink_options import MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
 from scenarios.metrics import flight_metrics
 from scenarios.options import Overrides, refuse_unavailable, with_overrides
 from scenarios.pilots import load_pilot

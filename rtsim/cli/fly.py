@@ -153,7 +153,7 @@ def fly_command(
     load_pilot(chosen.pilot)
     link = None
     if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
-        from scenarios.hands import MavlinkOptions, mavlink_config, refuse_unpaced
+        from scenarios.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced
 
         link = MavlinkOptions(
             targets=tuple(mavlink or ()),

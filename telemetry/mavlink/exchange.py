@@ -1,24 +1,21 @@
 """Shared memory between the flight and its MAVLink process: sticks and requests in, feedback and texts out.
 
-Nothing here waits. A value that is written whole and read often (sticks, feedback) lives in a sequence lock: the
-writer makes the count odd, writes, makes it even; a reader that saw the count change keeps what it had and looks again
-in the next frame. Things that happen once (requests, texts) go through a queue with one writer and one reader.
+Nothing here waits; how, says ``shared_memory``.
 """
 
 from __future__ import annotations
 
 import atexit
 import struct
-import threading
 from multiprocessing.shared_memory import SharedMemory
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 from rtsim.command import StickInput
 from rtsim.errors import InputError
+from telemetry.mavlink.shared_memory import WORD, Queue, SequenceLock
 from telemetry.ring import _attach_untracked
 
 _MAGIC = 0x5254_5349_4D4D_4156
-_WORD = 8
 _HEADER_WORDS = 32
 _STICK_COUNT = 12
 _REQUEST = struct.Struct("<16s24sd")
@@ -73,120 +70,11 @@ class Feedback(NamedTuple):
 
 # Offsets in bytes; every part begins on a word.
 _FEEDBACK_COUNT = len(Feedback._fields)
-_STICK_AT = _WORD * _HEADER_WORDS
-_FEEDBACK_AT = _STICK_AT + _WORD * (1 + _STICK_COUNT)
-_REQUESTS_AT = _FEEDBACK_AT + _WORD * (1 + _FEEDBACK_COUNT)
-_TEXTS_AT = _REQUESTS_AT + _WORD * 2 + _REQUEST_SLOTS * _REQUEST.size
-_SIZE = _TEXTS_AT + _WORD * 2 + _TEXT_SLOTS * _TEXT.size
-
-
-class SequenceLock:
-    """A handful of float64 values, written whole by one side and read whole by the other."""
-
-    def __init__(self, memory: SharedMemory, offset: int, count: int) -> None:
-        """Lay it over shared memory.
-
-        Args:
-            memory: The shared memory.
-            offset: Where it begins [bytes].
-            count: How many values.
-        """
-        buffer = memory.buf
-        assert buffer is not None
-        # Two readings of the count around a copy show a torn read.
-        self._count = buffer[offset : offset + _WORD].cast("q")
-        self._values = buffer[offset + _WORD : offset + _WORD * (1 + count)].cast("d")
-        self._pack = struct.Struct(f"={count}d").pack_into
-        self._fence = threading.Lock()
-
-    def write(self, values: tuple[float, ...]) -> None:
-        """Publish new values.
-
-        Args:
-            values: As many as the lock holds.
-        """
-        count = self._count[0] + (self._count[0] & 1)  # a writer that died half-way left it odd
-        self._count[0] = count + 1
-        with self._fence:  # orders the stores, also off x86
-            pass
-        self._pack(self._values, 0, *values)
-        with self._fence:
-            pass
-        self._count[0] = count + 2
-
-    @property
-    def version(self) -> int:
-        """Changes with every write."""
-        return self._count[0]
-
-    def read(self) -> list[float] | None:
-        """The values, or None while they are being written; call again in the next frame then."""
-        before = self._count[0]
-        if before & 1:
-            return None
-        values = cast("list[float]", self._values.tolist())
-        return values if self._count[0] == before else None
-
-    def release(self) -> None:
-        """Let the shared memory go."""
-        self._values.release()
-        self._count.release()
-
-
-class Queue:
-    """Fixed-size records from one writer to one reader; a full queue refuses."""
-
-    def __init__(self, memory: SharedMemory, offset: int, *, record: struct.Struct, slots: int) -> None:
-        """Lay it over shared memory.
-
-        Args:
-            memory: The shared memory.
-            offset: Where it begins [bytes].
-            record: Layout of a record.
-            slots: How many records fit.
-        """
-        buffer = memory.buf
-        assert buffer is not None
-        self._ends = buffer[offset : offset + 2 * _WORD].cast("q")
-        first = offset + 2 * _WORD
-        self._buffer = buffer[first : first + slots * record.size]
-        self._record, self._slots = record, slots
-        self._fence = threading.Lock()
-
-    def put(self, *values: object) -> bool:
-        """Append a record.
-
-        Args:
-            *values: What the record's layout takes.
-
-        Returns:
-            False where the reader is so far behind that there is no room.
-        """
-        written, taken = self._ends[0], self._ends[1]
-        if written - taken >= self._slots:
-            return False
-        self._record.pack_into(self._buffer, (written % self._slots) * self._record.size, *values)
-        with self._fence:
-            pass
-        self._ends[0] = written + 1
-        return True
-
-    def take(self) -> list[tuple[object, ...]]:
-        """Everything that was put since; an empty list costs a fraction of a microsecond."""
-        written, taken = self._ends[0], self._ends[1]
-        if written == taken:
-            return []
-        records = [
-            self._record.unpack_from(self._buffer, (number % self._slots) * self._record.size)
-            for number in range(taken, written)
-        ]
-        self._ends[1] = written
-        return records
-
-    def release(self) -> None:
-        """Let the shared memory go."""
-        self._buffer.release()
-        self._ends.release()
+_STICK_AT = WORD * _HEADER_WORDS
+_FEEDBACK_AT = _STICK_AT + WORD * (1 + _STICK_COUNT)
+_REQUESTS_AT = _FEEDBACK_AT + WORD * (1 + _FEEDBACK_COUNT)
+_TEXTS_AT = _REQUESTS_AT + WORD * 2 + _REQUEST_SLOTS * _REQUEST.size
+_SIZE = _TEXTS_AT + WORD * 2 + _TEXT_SLOTS * _TEXT.size
 
 
 class Exchange:
@@ -212,7 +100,7 @@ class Exchange:
             except (FileNotFoundError, ValueError) as failure:
                 raise InputError("there is no exchange of this name", key="exchange", value=name) from failure
         assert self._memory.buf is not None
-        self.header = self._memory.buf[: _WORD * _HEADER_WORDS].cast("q")
+        self.header = self._memory.buf[: WORD * _HEADER_WORDS].cast("q")
         """Flags and counters, see the constants of this module."""
         if self._owns:
             self.header[MAGIC] = _MAGIC

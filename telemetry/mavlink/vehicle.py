@@ -18,9 +18,6 @@ from telemetry.mavlink import messages as ids
 from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
 from telemetry.mavlink.exchange import (
-    ACCEPTED as ACCEPTED_WORD,
-)
-from telemetry.mavlink.exchange import (
     ARMED,
     DISCARDED,
     PEERS,
@@ -34,22 +31,21 @@ from telemetry.mavlink.messages import MessageFactory
 from telemetry.mavlink.modes import offered_modes
 from telemetry.mavlink.notices import INFO, WARNING, NoticeBoard
 from telemetry.mavlink.parameters import (
-    AID_PARAMETERS,
-    LEVER_RANGE,
     NACELLE_COMMAND,
     OWNER_TIME,
     WARNINGS,
     ParameterStore,
 )
 from telemetry.mavlink.peers import Address, Peer, PeerTable
-from telemetry.mavlink.pilot_input import OwnerLock, PilotId, StickReader
+from telemetry.mavlink.pilot_input import OwnerLock, StickReader
 from telemetry.mavlink.services import Services
 from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST, FlightState
+from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
 
 LONGEST_PAUSE_S = 0.02
 """Changes in the flight are noticed at least this often [s]."""
 _LIST_PAUSE_S = 0.004
-_GROUND_HEARTBEAT, _SET_MODE, _MANUAL_CONTROL, _OVERRIDE, _COMMAND_INT, _COMMAND_LONG = 0, 11, 69, 70, 75, 76
+_GROUND_HEARTBEAT, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 11, 75, 76
 
 
 class Vehicle:
@@ -87,19 +83,21 @@ class Vehicle:
         )
         self.services = Services(self)
         self._commands = CommandHandler(self)
+        self._stick_port = StickPort(self)
         self._answers = {
             **self.services.answers,
             _SET_MODE: self._take_set_mode,
             _COMMAND_INT: self._take_command,
             _COMMAND_LONG: self._take_command,
         }
-        self._handled = {*self._answers, _GROUND_HEARTBEAT, _MANUAL_CONTROL, _OVERRIDE}
-        self._exchange, self._send = exchange, send
+        self._handled = {*self._answers, _GROUND_HEARTBEAT, MANUAL_CONTROL, OVERRIDE}
+        self.exchange = exchange
+        """Shared memory to the flight."""
+        self._send = send
         self._decoder = dialect.MAVLink(None)
         self._identity: tuple[int, ...] = ()
         self._vtol_state = 0
         self._input_state = 0
-        self._explained = False
         if config.parameter_file:
             self._load_parameters(config.parameter_file)
 
@@ -115,11 +113,11 @@ class Vehicle:
             now: Monotonic time [s].
         """
         self.now = now
-        self._exchange.header[RECEIVED] += 1
+        self.exchange.header[RECEIVED] += 1
         known = self.peers.by_address.get(address)
         bucket = known.incoming if known is not None else self.peers.strangers
         if len(datagram) < 8 or datagram[0] not in {0xFD, 0xFE} or not bucket.take(now):
-            self._exchange.header[DISCARDED] += 1
+            self.exchange.header[DISCARDED] += 1
             return
         used = False
         for frame in frames(datagram):
@@ -141,13 +139,13 @@ class Vehicle:
                 if message is not None:
                     self._dispatch(message, frame, peer, received_ns=received_ns, now=now)
         if not used:
-            self._exchange.header[DISCARDED] += 1
+            self.exchange.header[DISCARDED] += 1
 
     def _dispatch(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
         """Hand a message to whoever answers it."""
         number = frame.message_id
-        if number in {_MANUAL_CONTROL, _OVERRIDE}:
-            self._take_sticks(message, frame, peer, received_ns=received_ns, now=now)
+        if number in {MANUAL_CONTROL, OVERRIDE}:
+            self._stick_port.take(message, frame, peer, received_ns=received_ns)
             return
         if number == _GROUND_HEARTBEAT:
             if message.type == dialect.MAV_TYPE_GCS:
@@ -161,46 +159,6 @@ class Vehicle:
         system = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
         return system in {0, self.config.system_id} and component in {0, self.config.component_id}
-
-    def _take_sticks(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
-        """Take sticks from whoever holds them."""
-        manual = frame.message_id == _MANUAL_CONTROL
-        target = message.target if manual else message.target_system
-        if target not in {0, self.config.system_id}:
-            return
-        pilot = PilotId(frame.system_id, frame.component_id, peer.address)
-        before = self.lock.owner
-        if not self.lock.claim(pilot, now, release_after=self.store[OWNER_TIME]):
-            if self.lock.allowed(frame.system_id):
-                self.board.say_seldom(f"refused {pilot}", WARNING, f"Sticks are held by {before}, not {pilot}", now)
-            else:
-                self.board.say_seldom("whitelist", WARNING, f"System {frame.system_id} may not fly", now)
-            return
-        if before != self.lock.owner:
-            self.board.say(INFO, f"Sticks: {pilot}")
-        if manual:
-            bipolar = self.store[LEVER_RANGE] == 1.0
-            pressed = self.reader.manual_control(message, received_ns=received_ns, pilot=pilot, bipolar=bipolar)
-            for function in pressed:
-                self._press(function)
-        else:
-            self.reader.override(message, received_ns=received_ns, pilot=pilot)
-        sticks = self.reader.sticks
-        self._exchange.write_sticks(sticks)
-        self._exchange.header[ACCEPTED_WORD] += 1
-        if not self._explained and max(abs(sticks.lateral), abs(sticks.yaw)) > 0.2:
-            self._explained = True
-            self.board.say(INFO, "Roll and yaw are shown but do not act")
-
-    def _press(self, function: str) -> None:
-        """A button that acts once went down."""
-        if function in AID_PARAMETERS:
-            if function in self.config.aids:
-                self.request(Request("aid", function, 2.0))
-        elif function == "freeze":
-            self.request(Request("freeze"))
-        elif function == "pilot":
-            self.request(Request("pilot", "next"))
 
     def _take_command(self, message: Any, frame: Frame, peer: Peer) -> None:
         if frame.message_id == _COMMAND_LONG:
@@ -250,7 +208,7 @@ class Vehicle:
         Args:
             request: What.
         """
-        if not self._exchange.put_request(request):
+        if not self.exchange.put_request(request):
             self.board.say_seldom("queue", WARNING, "The flight does not listen", self.now)
 
     # Sending
@@ -263,7 +221,7 @@ class Vehicle:
             message: A pymavlink message.
         """
         self._send(self.peers.pack(peer, message), peer.address)
-        self._exchange.header[SENT] += 1
+        self.exchange.header[SENT] += 1
 
     def reply(self, peer: Peer, message: Any) -> None:
         """Answer one station, unless it has used up its answers for now.
@@ -294,9 +252,9 @@ class Vehicle:
             When to call again at the latest, monotonic [s].
         """
         self.now = now
-        for severity, text in self._exchange.take_texts():
+        for severity, text in self.exchange.take_texts():
             self.board.say(severity, text)
-        feedback = self._exchange.read_feedback()
+        feedback = self.exchange.read_feedback()
         if feedback is not None:
             self.state.feedback = feedback
         if self.state.started:
@@ -311,7 +269,7 @@ class Vehicle:
         notice = self.board.take(now)
         if notice is not None:
             self.broadcast(dialect.MAVLink_statustext_message(notice.severity, notice.text.encode()))
-        header = self._exchange.header
+        header = self.exchange.header
         header[PEERS], header[ARMED] = self.peers.heard, int(self.state.armed)
         listing = any(peer.parameter_next >= 0 for peer in self.peers.by_address.values())
         due = min((peer.schedule.next_due for peer in self.peers.by_address.values()), default=math.inf)
@@ -320,7 +278,7 @@ class Vehicle:
     def farewell(self) -> None:
         """Tell every station that the flight is over."""
         self.state.armed = False
-        for severity, text in self._exchange.take_texts():
+        for severity, text in self.exchange.take_texts():
             self.board.say(severity, text)
         self.board.say(INFO, "Flight over")
         while (notice := self.board.take(self.now)) is not None:

@@ -16,8 +16,9 @@ from rtsim.frame import COLUMN
 from rtsim.realtime import FlightControl
 from rtsim.simulation import Simulation
 from rtsim.units import to_deg
-from scenarios.hands import Hands, MavlinkOptions, mavlink_config
+from scenarios.hands import Hands
 from scenarios.loader import load_scenario
+from scenarios.mavlink_options import MavlinkOptions, mavlink_config
 from scenarios.options import Overrides, with_overrides
 from scenarios.runner import flight_setup
 from scenarios.scenario import AidName

@@ -1,0 +1,229 @@
+"""Messages that show the flight: attitude, position, speeds, the tiltrotor's own values, the sticks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import all as dialect
+
+from rtsim.frame import TIMING_SIGNALS
+from rtsim.units import KNOT, deg, to_deg
+from telemetry.mavlink.config import HomePosition
+from telemetry.mavlink.fields import real, whole, wrapped
+from telemetry.mavlink.state import INPUT_LIVE, PILOT_EXTERNAL, PILOT_HOLD, FlightState
+
+METRES_PER_DEGREE = 6_371_000.0 * math.pi / 180.0
+"""Length of a degree of latitude on a sphere [m]."""
+_TIMING = {signal.name: place for place, signal in enumerate(TIMING_SIGNALS)}
+
+
+def loop_value(state: FlightState, name: str) -> float:
+    """A wall-clock column of the newest row.
+
+    Args:
+        state: The flight.
+        name: Name of the column.
+    """
+    return float(state.timing[_TIMING[name]])
+
+
+class FlightMessages:
+    """Builds the messages from the newest row."""
+
+    def __init__(self, home: HomePosition, state: FlightState) -> None:
+        """Connect.
+
+        Args:
+            home: Where the flight began on the globe.
+            state: The flight, kept up to date by the vehicle.
+        """
+        self._home, self._state = home, state
+        self._heading = home.heading_deg % 360.0
+        self._metres_per_degree_east = METRES_PER_DEGREE * max(math.cos(deg(home.latitude_deg)), 0.01)
+
+    def attitude(self) -> list[Any]:
+        """ATTITUDE."""
+        value = self._state.value
+        return [
+            dialect.MAVLink_attitude_message(
+                self._state.boot_ms,
+                0.0,
+                real(deg(value("pitch_deg"))),
+                wrapped(deg(self._heading)),
+                0.0,
+                real(deg(value("pitch_rate_deg_s"))),
+                0.0,
+            )
+        ]
+
+    def attitude_quaternion(self) -> list[Any]:
+        """ATTITUDE_QUATERNION, the same attitude."""
+        half_pitch = 0.5 * deg(self._state.value("pitch_deg"))
+        half_yaw = 0.5 * wrapped(deg(self._heading))
+        cp, sp, cy, sy = math.cos(half_pitch), math.sin(half_pitch), math.cos(half_yaw), math.sin(half_yaw)
+        rate = real(deg(self._state.value("pitch_rate_deg_s")))
+        return [
+            dialect.MAVLink_attitude_quaternion_message(
+                self._state.boot_ms, cp * cy, -sp * sy, sp * cy, cp * sy, 0.0, rate, 0.0
+            )
+        ]
+
+    def _ground_velocity(self) -> tuple[float, float, float]:
+        """North, east, down [m/s]."""
+        speed = self._state.value("ground_speed_kt") * KNOT
+        heading = deg(self._heading)
+        return speed * math.cos(heading), speed * math.sin(heading), -self._state.value("climb_rate_m_s")
+
+    def _ground_position(self) -> tuple[float, float]:
+        """North and east of the start [m]."""
+        distance, heading = self._state.value("distance_m"), deg(self._heading)
+        return distance * math.cos(heading), distance * math.sin(heading)
+
+    def local_position(self) -> list[Any]:
+        """LOCAL_POSITION_NED: from the start on the ground below."""
+        north, east = self._ground_position()
+        fields = north, east, -self._state.value("altitude_m"), *self._ground_velocity()
+        return [dialect.MAVLink_local_position_ned_message(self._state.boot_ms, *map(real, fields))]
+
+    def _latitude_longitude(self) -> tuple[int, int]:
+        """Position in 1e-7 degrees."""
+        north, east = self._ground_position()
+        latitude = self._home.latitude_deg + north / METRES_PER_DEGREE
+        longitude = self._home.longitude_deg + east / self._metres_per_degree_east
+        longitude = (longitude + 180.0) % 360.0 - 180.0
+        return whole(latitude * 1e7, -900_000_000, 900_000_000), whole(longitude * 1e7, -1_800_000_000, 1_800_000_000)
+
+    def _altitude_amsl(self) -> float:
+        return self._state.value("altitude_m") + self._home.altitude_m
+
+    def global_position(self) -> list[Any]:
+        """GLOBAL_POSITION_INT."""
+        latitude, longitude = self._latitude_longitude()
+        north, east, down = (whole(100.0 * speed, -32767, 32767) for speed in self._ground_velocity())
+        return [
+            dialect.MAVLink_global_position_int_message(
+                self._state.boot_ms,
+                latitude,
+                longitude,
+                whole(1000.0 * self._altitude_amsl(), -(2**31), 2**31 - 1),
+                whole(1000.0 * self._state.value("altitude_m"), -(2**31), 2**31 - 1),
+                north,
+                east,
+                down,
+                whole(100.0 * self._heading, 0, 35999),
+            )
+        ]
+
+    def vfr_hud(self) -> list[Any]:
+        """VFR_HUD: airspeed and ground speed without sign."""
+        value = self._state.value
+        return [
+            dialect.MAVLink_vfr_hud_message(
+                real(abs(value("airspeed_kt")) * KNOT),
+                real(abs(value("ground_speed_kt")) * KNOT),
+                whole(self._heading, 0, 359),
+                whole(100.0 * value("lever"), 0, 100),
+                real(self._altitude_amsl()),
+                real(value("climb_rate_m_s")),
+            )
+        ]
+
+    def named_values(self) -> list[Any]:
+        """NAMED_VALUE_FLOAT, one message per value."""
+        state, value = self._state, self._state.value
+        values = {
+            b"nac_deg": value("nacelle_deg"),
+            b"corr_lo": value("margin_low_kt"),
+            b"corr_hi": value("margin_high_kt"),
+            b"flap_deg": value("flapping_deg"),
+            b"rpm_pct": state.rotor_speed_pct,
+            b"trq_pct": state.torque_pct,
+            b"wflap_deg": value("flap_deg"),
+            b"in_age_ms": 1e3 * state.feedback.age,
+        }
+        stamp = state.boot_ms
+        return [dialect.MAVLink_named_value_float_message(stamp, name, real(v)) for name, v in values.items()]
+
+    def debug_array(self) -> list[Any]:
+        """DEBUG_FLOAT_ARRAY; places as in docs/mavlink.md."""
+        state, value = self._state, self._state.value
+        numbers = [
+            value("nacelle_deg"),
+            state.nacelle_command_deg,
+            value("margin_low_kt"),
+            value("margin_high_kt"),
+            value("flapping_deg"),
+            value("collective_75_deg"),
+            state.rotor_speed_pct,
+            state.torque_pct,
+            value("angle_of_attack_deg"),
+            loop_value(state, "work_us") * 1e-3,
+            1e3 * state.feedback.age,
+            state.shown_stick,
+            state.feedback.lateral,
+            state.feedback.yaw,
+            value("corridor_level"),
+            value("flap_deg"),
+        ]
+        data = [real(number) for number in numbers] + [0.0] * (58 - len(numbers))
+        return [dialect.MAVLink_debug_float_array_message(state.boot_us, b"xv15", 1, data)]
+
+    def rc_channels(self) -> list[Any]:
+        """RC_CHANNELS: the sticks as applied."""
+        state = self._state
+        channels = (
+            1500.0 + 500.0 * state.feedback.lateral,
+            1500.0 - 500.0 * state.shown_stick,
+            1000.0 + 1000.0 * state.shown_lever,
+            1500.0 + 500.0 * state.feedback.yaw,
+            1500.0 - 500.0 * state.feedback.nacelle_switch,
+            1000.0 + 1000.0 * state.nacelle_command_deg / 90.0,
+            {PILOT_EXTERNAL: 1500.0, PILOT_HOLD: 2000.0}.get(state.pilot, 1000.0),
+            1000.0 + 1000.0 * float(state.armed),
+        )
+        raw = [whole(channel, 800, 2200) for channel in channels] + [65535] * 10
+        rssi = 100 if int(state.feedback.input_state) == INPUT_LIVE else 0
+        return [dialect.MAVLink_rc_channels_message(state.boot_ms, 8, *raw, rssi)]
+
+    def servo_output(self) -> list[Any]:
+        """SERVO_OUTPUT_RAW: elevator, cyclic, collective, nacelle, flaps."""
+        value = self._state.value
+        outputs = (
+            1500.0 + 500.0 * value("elevator_deg") / 20.0,
+            1500.0 + 500.0 * value("cyclic_deg") / 10.0,
+            1000.0 + 1000.0 * value("collective_75_deg") / 50.0,
+            1000.0 + 1000.0 * value("nacelle_deg") / 90.0,
+            1000.0 + 1000.0 * value("flap_deg") / 75.0,
+        )
+        raw = [whole(output, 800, 2200) for output in outputs] + [0, 0, 0]
+        return [dialect.MAVLink_servo_output_raw_message(self._state.boot_us & 0xFFFFFFFF, 0, *raw)]
+
+    def altitude(self) -> list[Any]:
+        """ALTITUDE."""
+        height, amsl = real(self._state.value("altitude_m")), real(self._altitude_amsl())
+        ground = self._home.altitude_m
+        return [dialect.MAVLink_altitude_message(self._state.boot_us, amsl, amsl, height, height, ground, height)]
+
+    def gps(self) -> list[Any]:
+        """GPS_RAW_INT: a perfect receiver."""
+        latitude, longitude = self._latitude_longitude()
+        north, east, _ = self._ground_velocity()
+        speed = math.hypot(north, east)
+        course = to_deg(math.atan2(east, north)) % 360.0 if speed > 0.1 else self._heading
+        altitude = whole(1000.0 * self._altitude_amsl(), -(2**31), 2**31 - 1)
+        return [
+            dialect.MAVLink_gps_raw_int_message(
+                self._state.boot_us,
+                3,
+                latitude,
+                longitude,
+                altitude,
+                100,
+                100,
+                whole(100.0 * speed, 0, 65534),
+                whole(100.0 * course, 0, 35999),
+                12,
+                altitude,
+            )
+        ]
