@@ -13,7 +13,7 @@ from rtsim.aids import AIDS
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
-from rtsim.realtime import FlightControl
+from rtsim.realtime import Executive, FlightControl
 from rtsim.simulation import Simulation
 from rtsim.units import to_deg
 from scenarios.hands import Hands
@@ -23,6 +23,7 @@ from scenarios.options import Overrides, with_overrides
 from scenarios.runner import flight_setup
 from scenarios.scenario import AidName
 from scenarios.session import FlightSession
+from scenarios.sinks import FlightSinks
 from telemetry.mavlink import Request
 from telemetry.mavlink.parameters import AID_PARAMETERS
 
@@ -225,3 +226,29 @@ def test_the_hand_flight_starts_where_it_is_asked_to(start, nacelle):
     scenario = with_overrides(load_scenario("manual_flight"), Overrides(pilot="mavlink", start=start))
     assert to_deg(scenario.start.nacelle_angle) == pytest.approx(nacelle)
     assert scenario.programme.duration == 0.0
+
+
+def test_a_frozen_flight_is_thawed_by_the_same_button(flight):
+    """The executive asks for requests while it stands still."""
+    flight.session._frames = 60
+    fly_from = flight.session.step
+    looked = []
+
+    def step():
+        if flight.simulation.frame_index == 20:
+            flight.link.input.asked = [Request("freeze")]
+        return fly_from()
+
+    def asked_while_frozen():
+        looked.append(flight.control.paused)
+        if len(looked) == 5:
+            flight.link.input.asked = [Request("freeze")]
+        hear()
+
+    flight.session.step = step
+    hear, flight.control.poll = flight.control.poll, asked_while_frozen
+    report = Executive(flight.session, FlightSinks(), control=flight.control).fly()
+    assert report.frames == 60
+    assert len(looked) >= 5
+    assert report.paused_s >= 0.02
+    assert not flight.control.paused
