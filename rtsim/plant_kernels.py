@@ -71,11 +71,14 @@ def plant_step(
     raise TypeError("plant_step is for compiled kernels")
 
 
+_OPTIONS: Any = {"error_model": "numpy", "_nrt": False}  # as rtsim.compiled.inner_kernel
+
+
 def _is_nonlinear(kind: types.Type) -> bool:
-    return isinstance(kind, types.BaseNamedTuple) and kind.instance_class is AircraftTables
+    return isinstance(kind, (types.NamedTuple, types.NamedUniTuple)) and kind.instance_class is AircraftTables
 
 
-@overload(plant_outputs, jit_options={"error_model": "numpy", "_nrt": False})
+@overload(plant_outputs, jit_options=_OPTIONS)
 def _choose_outputs(aircraft: Any, lpv: Any, x: Any, u: Any, angle: Any, space: Any) -> Callable[..., None]:
     if _is_nonlinear(aircraft):
 
@@ -90,7 +93,7 @@ def _choose_outputs(aircraft: Any, lpv: Any, x: Any, u: Any, angle: Any, space: 
     return from_lpv
 
 
-@overload(plant_step, jit_options={"error_model": "numpy", "_nrt": False})
+@overload(plant_step, jit_options=_OPTIONS)
 def _choose_step(aircraft: Any, lpv: Any, x: Any, u: Any, path: Any, dt: Any, work: Any) -> Callable[..., float]:
     if _is_nonlinear(aircraft):
 

@@ -19,7 +19,7 @@ from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import FloatArray
+from rtsim.frame import COLUMN, FloatArray
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables
@@ -223,7 +223,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> ke
     if setup.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
     kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))
-    row = np.zeros(len(kernels.COLUMN))
+    row = np.zeros(len(COLUMN))
     kernels.observe(parts.tables, state, parts.scratch, row)
     kernels.engage_pilot(parts.tables, state, parts.scratch)
     return state

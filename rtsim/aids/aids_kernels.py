@@ -37,7 +37,7 @@ class AidTables(NamedTuple):
     nacelle: FloatArray
     """Nacelle axis [rad]."""
     maps: FloatArray
-    """Trim stick, pitch acceleration per stick and per pitch rate, climb and forward acceleration per lever; (5, V, N)."""
+    """Trim stick, pitch acceleration per stick and pitch rate, climb and forward acceleration per lever; (5, V, N)."""
     schedule_time: float
     """Time constant of the airspeed that schedules the aids [s]."""
     damping: float
@@ -167,7 +167,13 @@ def _terms(
 
 @inner_kernel
 def aids_engage(
-    tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray, acting: FloatArray
+    tables: AidTables,
+    state: FloatArray,
+    switches: FloatArray,
+    x: FloatArray,
+    nacelle: float,
+    hands: FloatArray,
+    acting: FloatArray,
 ) -> None:
     """Start or re-start the aids from the present flight so that the acting controls do not step.
 
@@ -252,7 +258,9 @@ def aids_step(
         if abs(height_error) < 20.0:
             gain = tables.altitude_frequency**2 / tables.integral_time
             state[ALTITUDE_INTEGRAL] = _limited(state[ALTITUDE_INTEGRAL] + dt * gain * height_error, 2.0)
-    held_by_hold = (switches[AIRSPEED_HOLD] != 0.0 and helicopter) or (switches[ALTITUDE_HOLD] != 0.0 and not helicopter)
+    held_by_hold = (switches[AIRSPEED_HOLD] != 0.0 and helicopter) or (
+        switches[ALTITUDE_HOLD] != 0.0 and not helicopter
+    )
     if not held_by_hold:
         state[PITCH_REFERENCE] -= dt * tables.rate_command * pushed
     # The reference never runs away from an attitude the aircraft cannot follow.

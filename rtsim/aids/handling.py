@@ -1,8 +1,8 @@
 """Handling numbers of the aircraft in the pilot's hands: roots, damping and attitude bandwidth, with any set of aids.
 
 The loop is the one that flies: the LPV aircraft's Runge-Kutta step and the aids' kernel, frame by frame, linearized
-numerically about a trim. Attitude bandwidth follows ADS-33E-PRF 3.4.1: the lower of the frequency at which pitch lags the
-stick by 135 deg and the frequency at which 6 dB are left to the gain at 180 deg.
+numerically about a trim. Attitude bandwidth follows ADS-33E-PRF 3.4.1: the lower of the frequency at which pitch lags
+the stick by 135 deg and the frequency at which 6 dB are left to the gain at 180 deg.
 """
 
 from __future__ import annotations
@@ -46,9 +46,7 @@ class Handling:
         return complex(mid[np.argmin(-mid.real / np.abs(mid))]) if mid.size else 0j
 
 
-def handling(
-    aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tuple[AidName, ...]
-) -> Handling:
+def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tuple[AidName, ...]) -> Handling:
     """Linearize the aircraft with aids about its level trim.
 
     Args:
@@ -69,7 +67,7 @@ def handling(
     def frame(z: FloatArray, stick: float) -> FloatArray:
         x, state = z[: x0.size].copy(), np.concatenate([z[x0.size :], switches])
         acting, u = acting0.copy(), trim.u.copy()
-        aids_step(tables, state, switches, x, nacelle, hands0 + [stick, 0.0], acting, DT)
+        aids_step(tables, state, switches, x, nacelle, hands0 + np.array([stick, 0.0]), acting, DT)
         u[:2] = acting
         lpv_step(lpv, x, u, path, DT, work)
         return np.concatenate([x, state[:LAST_SWITCHES]])

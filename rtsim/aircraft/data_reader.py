@@ -176,9 +176,7 @@ def _tail(data: Data) -> TailTables:
         )
 
     flat = [[1.0] * len(speeds) for _ in tail["eta_alpha_deg"]]
-    sixty = [
-        [1.05 if -12.0 <= a <= 16.0 else 0.8 if a == 20.0 else 1.0] * len(speeds) for a in tail["eta_alpha_deg"]
-    ]
+    sixty = [[1.05 if -12.0 <= a <= 16.0 else 0.8 if a == 20.0 else 1.0] * len(speeds) for a in tail["eta_alpha_deg"]]
     printed = [tail[f"eta_b{b}_rows_alpha_cols_V"] for b in (0, 15)]
     ratio = [eta(rows_) for rows_ in (*printed, flat, sixty, flat)]
     wake_speeds = [v * KNOT for v in wake["V_kt"]]

@@ -164,9 +164,7 @@ def derivative(
         induced,
         (moment_arm((body.position[0], body.position[1]), centre), pivot, tail_arm),
     )
-    tail_x, tail_z, tail_m = tail_load(
-        tail, air, (ua, wa, qa), (nacelle, flap, x[STATE.elevator]), induced, tail_arm
-    )
+    tail_x, tail_z, tail_m = tail_load(tail, air, (ua, wa, qa), (nacelle, flap, x[STATE.elevator]), induced, tail_arm)
     force_x = rotor_x + wing_x + body_x + tail_x
     force_z = rotor_z + wing_z + body_z + tail_z
     inertia = mass.pitch_inertia_airplane + mass.pitch_inertia_slope * nacelle
@@ -236,11 +234,9 @@ def outputs(
     y[OUTPUT.torque] = work[TORQUE]
     y[OUTPUT.power] = 2.0 * work[TORQUE] * tables.configuration.rotor_speed
     y[OUTPUT.load_factor] = -work[WORK_FORCE_Z] / (tables.configuration.mass * GRAVITY)
-    y[OUTPUT.airspeed_rate] = (
-        xdot[STATE.u] * ct + xdot[STATE.w] * st + (x[STATE.w] * ct - x[STATE.u] * st) * x[STATE.q]
-    )
-    # The angle of attack is undefined at rest: SCHEDULING_SPEED along the horizon makes the output smooth there and leaves
-    # level flight as it is.
+    y[OUTPUT.airspeed_rate] = xdot[STATE.u] * ct + xdot[STATE.w] * st + (x[STATE.w] * ct - x[STATE.u] * st) * x[STATE.q]
+    # The angle of attack is undefined at rest: SCHEDULING_SPEED along the horizon makes the output smooth there and
+    # leaves level flight as it is.
     ua, wa = x[STATE.u] + u[INPUT.gust_u], x[STATE.w] + u[INPUT.gust_w]
     smooth_alpha = math.atan2(wa + SCHEDULING_SPEED * st, ua + SCHEDULING_SPEED * ct)
     y[OUTPUT.wing_angle_of_attack] = work[WORK_WING_ALPHA] - math.atan2(wa, ua) + smooth_alpha

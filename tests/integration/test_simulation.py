@@ -63,7 +63,7 @@ def test_restored_flight_repeats_itself(noise: bool) -> None:
 
 
 def test_snapshot_names_every_array_the_frame_changes() -> None:
-    """Enumeration: whatever differs after a second of flight is in the snapshot, and the scratch space carries nothing."""
+    """Enumeration: whatever differs after a second of flight is in the snapshot; scratch space carries nothing."""
     simulation = Simulation(short_conversion())
     simulation.run(300)
     snapshot = simulation.snapshot()

@@ -77,7 +77,7 @@ def backward_arrows(path):
     faults = []
     for name in imported_names(path):
         there = part_of(name)
-        if there is None or there == here or here == "rtsim.__main__":
+        if there is None or here in {there, "rtsim.__main__"}:
             continue
         if there in {"rtsim", "rtsim.__version__"}:  # the version stands at the very bottom
             continue
