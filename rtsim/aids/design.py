@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import functools
 from typing import Literal
 
 import numpy as np
@@ -38,6 +38,7 @@ AIDS: dict[AidName, int] = {
 RIGID_BODY = ("u", "w", "q", "pitch")
 
 
+@functools.lru_cache(maxsize=4)
 def design_aids(database: Database) -> AidTables:
     """Make the aids' schedules: what the controls do at each grid point once rotor and actuators have settled.
 
@@ -49,17 +50,15 @@ def design_aids(database: Database) -> AidTables:
     slow = [names.index(name) for name in RIGID_BODY]
     fast = [i for i, name in enumerate(names) if name not in (*RIGID_BODY, "altitude")]
     level = database.level_layer
-    shape = (len(database.airspeed), len(database.nacelle))
-    maps = np.zeros((MAP_COUNT, *shape))
-    for i, j in np.ndindex(shape):
-        reduced_a, reduced_b = _settled(database.A[level, i, j], database.B[level, i, j], slow, fast)
-        pitch = database.x_ref[level, i, j, names.index("pitch")]
-        stick, lever = inputs.index("stick"), inputs.index("lever")
-        maps[MAP_STICK, i, j] = database.u_ref[level, i, j, stick]
-        maps[MAP_PITCH_SENSITIVITY, i, j] = reduced_b[2, stick]
-        maps[MAP_PITCH_DAMPING, i, j] = reduced_a[2, 2]
-        maps[MAP_LEVER_LIFT, i, j] = math.sin(pitch) * reduced_b[0, lever] - math.cos(pitch) * reduced_b[1, lever]
-        maps[MAP_LEVER_THRUST, i, j] = math.cos(pitch) * reduced_b[0, lever] + math.sin(pitch) * reduced_b[1, lever]
+    stick, lever = inputs.index("stick"), inputs.index("lever")
+    reduced_a, reduced_b = _settled(database.A[level], database.B[level], slow, fast)
+    pitch = database.x_ref[level, ..., names.index("pitch")]
+    maps = np.zeros((MAP_COUNT, len(database.airspeed), len(database.nacelle)))
+    maps[MAP_STICK] = database.u_ref[level, ..., stick]
+    maps[MAP_PITCH_SENSITIVITY] = reduced_b[..., 2, stick]
+    maps[MAP_PITCH_DAMPING] = reduced_a[..., 2, 2]
+    maps[MAP_LEVER_LIFT] = np.sin(pitch) * reduced_b[..., 0, lever] - np.cos(pitch) * reduced_b[..., 1, lever]
+    maps[MAP_LEVER_THRUST] = np.cos(pitch) * reduced_b[..., 0, lever] + np.sin(pitch) * reduced_b[..., 1, lever]
     return AidTables(
         airspeed=database.airspeed,
         nacelle=database.nacelle,
@@ -80,12 +79,12 @@ def design_aids(database: Database) -> AidTables:
 
 
 def _settled(A: FloatArray, B: FloatArray, slow: list[int], fast: list[int]) -> tuple[FloatArray, FloatArray]:
-    """Residualise the fast states."""
-    inner = A[np.ix_(fast, fast)]
-    back = A[np.ix_(slow, fast)]
+    """Residualise the fast states at all points at once; leading axes are the grid's."""
+    all_fast, all_slow = A[..., fast, :], A[..., slow, :]
+    inner, back = all_fast[..., fast], all_slow[..., fast]
     return (
-        A[np.ix_(slow, slow)] - back @ np.linalg.solve(inner, A[np.ix_(fast, slow)]),
-        B[slow] - back @ np.linalg.solve(inner, B[fast]),
+        all_slow[..., slow] - back @ np.linalg.solve(inner, all_fast[..., slow]),
+        B[..., slow, :] - back @ np.linalg.solve(inner, B[..., fast, :]),
     )
 
 

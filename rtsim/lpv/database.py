@@ -5,6 +5,7 @@ Leading axes of every array are [layer, airspeed, nacelle]: the layers are trims
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -37,7 +38,7 @@ class PilotArrays:
     """What people and the loader need to know of the design (weights, versions)."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # the same only as itself, so that what is made from it can be kept
 class Database:
     """Trim map and linear models of one aircraft in one condition. SI and radians throughout."""
 
@@ -192,9 +193,19 @@ def load_database(path: str | Path | None = None) -> Database:
         from rtsim.lpv.mat_file import read_mat
 
         return read_mat(path)
+    from rtsim.lpv.database_file import SHIPPED, read_database
+
+    if path is None and SHIPPED.is_file():
+        return _read_once(SHIPPED.stat().st_mtime_ns)
+    return read_database(path)
+
+
+@functools.lru_cache(maxsize=1)
+def _read_once(_modified: int) -> Database:
+    """Keep the shipped database: its arrays are read-only, and a batch of flights asks for it again and again."""
     from rtsim.lpv.database_file import read_database
 
-    return read_database(path)
+    return read_database()
 
 
 def save_database(database: Database, path: str | Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Literal
 
 import numpy as np
@@ -41,6 +42,7 @@ KINEMATIC_TOLERANCE = 1e-3
 """Largest entry that may remain in the pitch and altitude rows after their kinematics are subtracted."""
 
 
+@functools.lru_cache(maxsize=8)
 def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refresh = "step") -> LpvTables:
     """Pack a database for the kernels.
 

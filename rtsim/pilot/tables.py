@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from rtsim.errors import InputError
@@ -23,6 +25,7 @@ INTEGRAL_REACH = 2.0
 """Limit of an integral when the pilot takes over, in multiples of its maximum in the design's weights."""
 
 
+@functools.lru_cache(maxsize=8)
 def load_pilot_tables(database: Database, outer_loop: OuterLoop = "integrators", *, dt: float = 0.004) -> PilotTables:
     """Take a pilot from a database and pack it for the kernels.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,7 @@ DEFAULT_WEIGHTS = RegulatorWeights(
 )
 
 
+@functools.lru_cache(maxsize=4)
 def reduce_model(database: Database, weights: RegulatorWeights = DEFAULT_WEIGHTS) -> ModelTables:
     """Reduce the level layer of a database to what the laws need.
 

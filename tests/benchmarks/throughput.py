@@ -100,7 +100,7 @@ def flight_rows() -> list[Row]:
 
     def run() -> int:
         record = scenarios.fly("typical_conversion", speed="max")
-        return int(record.summary["frames"])
+        return int(record.summary()["frames"])
 
     run()  # compile
     return [Row("scenarios.fly(..., speed='max'), whole flight", run, CLOSED_LOOP_HZ, "500 x real time")]
