@@ -135,6 +135,21 @@ def jsbsim_rows(steps: int) -> list[Row]:
     return [aircraft("c172p", 100.0), aircraft("f16", 350.0)]
 
 
+def telemetry_rows(pushes: int) -> list[Row]:
+    """What showing a frame costs the loop: a push into the view's ring, which nobody empties (it drops the oldest)."""
+    from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS
+    from telemetry.ring import Ring
+
+    ring, row, timing = Ring(), np.zeros(SIGNAL_COUNT), np.zeros(len(TIMING_SIGNALS))
+
+    def run() -> int:
+        for _ in range(pushes):
+            ring.push(row, timing)
+        return pushes
+
+    return [Row("push of a frame into the view's ring", run, CLOSED_LOOP_HZ, "10 us each")]
+
+
 def measure(rows: list[Row], repeats: int) -> list[dict[str, object]]:
     """Measure the rows in turns; steps per second and times real time."""
     rates: dict[str, list[float]] = {row.name: [] for row in rows}
@@ -165,7 +180,13 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=50_000)
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    rows = [*plant_step_rows(options.steps), *closed_loop_rows(), *flight_rows(), *jsbsim_rows(options.steps)]
+    rows = [
+        *plant_step_rows(options.steps),
+        *closed_loop_rows(),
+        *flight_rows(),
+        *telemetry_rows(options.steps),
+        *jsbsim_rows(options.steps),
+    ]
     results = measure(rows, options.repeats)
     if options.json:
         print(json.dumps({"machine": platform.machine(), "python": platform.python_version(), "rows": results}))
