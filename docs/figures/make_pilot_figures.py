@@ -11,7 +11,8 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from rtsim.corridor import load_corridor
-from rtsim.lpv.database import Database, load_database
+from rtsim.lpv.database import Database
+from rtsim.lpv.storage import load_database
 from rtsim.lpv.tables import prepare_tables
 from rtsim.pilot.frozen import Condition, StabilityMap, frozen_loop, stability_map
 from rtsim.pilot.schedule import OuterLoop

@@ -105,7 +105,7 @@ def _database_problems(path: Path) -> list[str]:
     if not path.is_file():
         return [str(InputError("does not exist", file=str(path), mend="check the path"))]
     try:
-        from rtsim.lpv.database import load_database
+        from rtsim.lpv.storage import load_database
 
         load_database(path)
     except RtsimError as error:

@@ -60,8 +60,8 @@ def build_command(
     Raises:
         OutputError: The file could not be written.
     """
-    from rtsim.lpv.database import save_database
     from rtsim.lpv.database_file import SHIPPED
+    from rtsim.lpv.storage import save_database
 
     target = out if out is not None else SHIPPED
     _require_suffix(target)
@@ -111,8 +111,8 @@ def info_command(
     Raises:
         InputError: The file is missing or not a usable database.
     """
-    from rtsim.lpv.database import load_database
     from rtsim.lpv.database_file import SHIPPED
+    from rtsim.lpv.storage import load_database
 
     database = load_database(file)
     result = {"file": str(file if file is not None else SHIPPED), **summary(database)}
@@ -136,7 +136,7 @@ def export_command(
     Raises:
         InputError: The name ends in neither .nc nor .mat, or the database is not usable.
     """
-    from rtsim.lpv.database import load_database, save_database
+    from rtsim.lpv.storage import load_database, save_database
 
     _require_suffix(file)
     save_database(load_database(database), file)
@@ -163,7 +163,7 @@ def import_command(
     Raises:
         InputError: The file is not a usable database: the message names the array and what is wrong.
     """
-    from rtsim.lpv.database import load_database, save_database
+    from rtsim.lpv.storage import load_database, save_database
 
     _require_suffix(file)
     target = out if out is not None else file.with_name(f"{file.stem}.rtsim.nc")

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from rtsim.aircraft.model import TrimPoint
 from rtsim.errors import InputError
 from rtsim.lpv import lpv_kernels as kernels
-from rtsim.lpv.database import Database, load_database
+from rtsim.lpv.database import Database
+from rtsim.lpv.storage import load_database
 from rtsim.lpv.tables import Form, Refresh, prepare_tables
 from rtsim.lpv.variables import position, required_position
 from rtsim.units import to_deg, to_kt

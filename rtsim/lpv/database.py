@@ -5,11 +5,9 @@ Leading axes of every array are [layer, airspeed, nacelle]: the layers are trims
 
 from __future__ import annotations
 
-import functools
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -175,60 +173,6 @@ def quantized(database: Database) -> Database:
         D=round_mantissa(database.D, JACOBIAN_BITS),
         df_dnacelle=round_mantissa(database.df_dnacelle, JACOBIAN_BITS),
     )
-
-
-def load_database(path: str | Path | None = None) -> Database:
-    """Read a database; without a path, the shipped one.
-
-    Args:
-        path: A NetCDF or MATLAB file (``.mat``) as written by ``save_database``; the layout is in docs/lpv.md.
-
-    Returns:
-        The database, checked, its arrays read-only.
-
-    Raises:
-        InputError: The file is missing, not readable, or not a database the kernels could fly.
-    """
-    if path is not None and Path(path).suffix.lower() == ".mat":
-        from rtsim.lpv.mat_file import read_mat
-
-        return read_mat(path)
-    from rtsim.lpv.database_file import SHIPPED, read_database
-
-    if path is None and SHIPPED.is_file():
-        return _read_once(SHIPPED.stat().st_mtime_ns)
-    return read_database(path)
-
-
-@functools.lru_cache(maxsize=1)
-def _read_once(_modified: int) -> Database:
-    """Keep the shipped database: its arrays are read-only, and a batch of flights asks for it again and again."""
-    from rtsim.lpv.database_file import read_database
-
-    return read_database()
-
-
-def save_database(database: Database, path: str | Path) -> None:
-    """Write a database to NetCDF or, for a name ending in ``.mat``, for MATLAB.
-
-    The target is replaced in one move when all is written.
-    Cells without a trim are missing values in NetCDF and filled again on reading.
-
-    Args:
-        database: What to write.
-        path: The target, ``*.nc`` or ``*.mat``.
-
-    Raises:
-        OutputError: The file could not be written; the old one, if any, still stands.
-    """
-    if Path(path).suffix.lower() == ".mat":
-        from rtsim.lpv.mat_file import write_mat
-
-        write_mat(database, path)
-        return
-    from rtsim.lpv.database_file import write_database
-
-    write_database(database, path)
 
 
 def fill_invalid(arrays: Mapping[str, npt.NDArray[np.generic]], airspeed: FloatArray, level_layer: int) -> None:

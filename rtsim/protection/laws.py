@@ -17,7 +17,8 @@ import numpy as np
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.errors import InputError
-from rtsim.lpv.database import Database, load_database
+from rtsim.lpv.database import Database
+from rtsim.lpv.storage import load_database
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels, limiter_kernels
 from rtsim.protection.boundary import BoundaryName

@@ -258,7 +258,7 @@ def identity(task: Task) -> dict[str, Any]:
     Args:
         task: The campaign.
     """
-    from rtsim.lpv.database import load_database
+    from rtsim.lpv.storage import load_database
     from scenarios.runner import versions
 
     return {

@@ -122,7 +122,7 @@ class Bench:
         """
         key = (name, buffer)
         if key not in self._laws:
-            from rtsim.lpv.database import load_database
+            from rtsim.lpv.storage import load_database
 
             tables = law_tables(name, load_database(), dt=self.dt, boundary=self.corridor)
             settings = tables.settings

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.lpv.database import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
+from rtsim.lpv.storage import load_database
 from rtsim.lpv.tables import prepare_tables
 from rtsim.pilot.frozen import Condition, frozen_loop, stability_map
 from rtsim.pilot.layout_kernels import pilot_state_size

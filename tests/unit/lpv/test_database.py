@@ -14,15 +14,8 @@ from scipy.io import loadmat, savemat
 
 from rtsim.aircraft.signals import Variable
 from rtsim.errors import InputError, OutputError
-from rtsim.lpv.database import (
-    GRIDDED,
-    PilotArrays,
-    fill_invalid,
-    load_database,
-    quantized,
-    round_mantissa,
-    save_database,
-)
+from rtsim.lpv.database import GRIDDED, PilotArrays, fill_invalid, quantized, round_mantissa
+from rtsim.lpv.storage import load_database, save_database
 
 PILOT = PilotArrays(
     {"gain": np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)}, {"delay": 0.15, "note": "made up", "order": 2}

@@ -11,7 +11,7 @@ from rtsim.aircraft import Condition, Xv15
 from rtsim.errors import InputError
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
-from rtsim.lpv.database import save_database
+from rtsim.lpv.storage import save_database
 from rtsim.units import deg, kt
 
 

@@ -11,8 +11,8 @@ from rtsim.aircraft import Condition, Xv15
 from rtsim.cli.model import _inside_corridor
 from rtsim.lpv.build import build_database
 from rtsim.lpv.checks import NEIGHBOUR_LIMIT, check_neighbours, describe
-from rtsim.lpv.database import load_database
 from rtsim.lpv.grid import Grid
+from rtsim.lpv.storage import load_database
 from rtsim.lpv.xv15 import source_sha256, still_trims
 
 
