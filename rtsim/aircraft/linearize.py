@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from rtsim.aircraft import dynamics_kernels as kernels
-from rtsim.aircraft.model import Condition, LinearModel, TrimPoint, Xv15
+from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
 from rtsim.aircraft.signals import OUTPUTS
 from rtsim.aircraft.table_kernels import FloatArray
 
@@ -13,6 +15,9 @@ from rtsim.aircraft.table_kernels import FloatArray
 STATE_STEPS = np.array(
     [0.05, 0.05, 2e-3, 1e-3, 1.0, 1e-4, 1e-2, 1e-4, 1e-2, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3]
 )
+
+if TYPE_CHECKING:
+    from rtsim.aircraft.model import Xv15
 INPUT_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-3, 0.05, 0.05, 2e-3])
 NACELLE_STEP = 1e-4
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rtsim.aircraft import dynamics_kernels as kernels
-from rtsim.aircraft.model import Condition, TrimPoint, Xv15
+from rtsim.aircraft.points import Condition, TrimPoint
 from rtsim.aircraft.signals import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES
 from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.trim_kernels import (
@@ -25,6 +26,9 @@ from rtsim.aircraft.trim_kernels import (
     trim_vectors,
 )
 from rtsim.units import GRAVITY, KNOT
+
+if TYPE_CHECKING:
+    from rtsim.aircraft.model import Xv15
 
 CONVERGED = 1e-9
 """Largest scaled residual of a converged trim."""

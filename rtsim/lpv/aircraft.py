@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.aircraft.model import TrimPoint
+from rtsim.aircraft.points import TrimPoint
 from rtsim.errors import InputError
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database

@@ -1,0 +1,63 @@
+"""What a flight condition is, and what trimming and linearizing at one give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rtsim.aircraft.table_kernels import FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """A flight condition to trim or linearize at. SI and radians; None keeps the default."""
+
+    airspeed: float
+    """Horizontal airspeed, signed [m/s]."""
+    nacelle_angle: float
+    """Nacelle angle, pi/2 helicopter [rad]."""
+    acceleration: float = 0.0
+    """Acceleration along the level flight path [m/s^2]."""
+    flap: float | None = None
+    """Flap deflection [rad]; None: the flap schedule."""
+    rotor_speed: float | None = None
+    """Rotor speed [rad/s]; None: 589 rpm."""
+    mass: float | None = None
+    """Mass [kg]; None: 13000 lb."""
+    pressure_altitude: float = 0.0
+    """Height in the standard atmosphere [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrimPoint:
+    """A steady (or steadily accelerating) level flight condition."""
+
+    x: FloatArray
+    """State; altitude 0."""
+    u: FloatArray
+    """Inputs; nacelle motion and gusts 0."""
+    y: FloatArray
+    """Outputs."""
+    xdot: FloatArray
+    """State derivative: zero, or the steady acceleration in body axes."""
+    converged: bool
+    """The residuals closed."""
+    residual: float
+    """Largest residual, accelerations in m/s^2 and rad/s^2."""
+    unclosed: str = ""
+    """Name of the state whose rate did not close (``elevator``: the stick would pass its stop); empty if converged."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinearModel:
+    """Jacobians of the whole nonlinear model, gravity and Coriolis terms included."""
+
+    A: FloatArray
+    """State matrix."""
+    B: FloatArray
+    """Input matrix."""
+    C: FloatArray
+    """Output matrix."""
+    D: FloatArray
+    """Feed-through."""
+    df_dnacelle: FloatArray
+    """Derivative of the state derivative with nacelle angle."""
