@@ -11,7 +11,13 @@ from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
-from rtsim.optimization.figures import OBJECTIVES, deviation_from_sums, figures_from_sums, figures_of_rows, objective_value
+from rtsim.optimization.figures import (
+    OBJECTIVES,
+    deviation_from_sums,
+    figures_from_sums,
+    figures_of_rows,
+    objective_value,
+)
 from rtsim.optimization.merit_kernels import MERIT_SIZE
 from rtsim.optimization.paths import PATH_NAMES, paper_path
 from rtsim.programme import Programme

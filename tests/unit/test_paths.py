@@ -75,7 +75,7 @@ def test_near_stall_keeps_its_distance_to_the_stall_line():
 
 
 def test_the_centre_line_is_the_mean_of_both_boundaries():
-    corners = dict((nacelle, airspeed) for airspeed, nacelle in centre_line_corners()[1:-1])
+    corners = {nacelle: airspeed for airspeed, nacelle in centre_line_corners()[1:-1]}
     assert corners[90.0] == pytest.approx(62.5, abs=0.1)
     assert corners[50.0] == pytest.approx(115.9, abs=0.5)
     assert corners[0.0] == pytest.approx(135.5, abs=0.1)
