@@ -34,6 +34,7 @@ COMMAND_MODULES = (
     "check",
     "timing",
     "optimize",
+    "reproduce",
     "joystick",
 )
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""

@@ -1,0 +1,169 @@
+"""The flights that the paper's figures need, each flown by several variants of aircraft and pilot."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.atmosphere.air import normals_needed
+from rtsim.frame import SIGNAL_COUNT, SIGNAL_NAMES, FloatArray
+from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
+from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
+from rtsim.pilot.layout_kernels import PilotTables
+from rtsim.pilot.schedule import OuterLoop
+from rtsim.pilot.weights import PilotSettings
+from rtsim.programme import Programme
+from rtsim.random_streams import STREAM_TURBULENCE, stream_generator
+from rtsim.simulation import END_REASONS
+from rtsim.simulation_kernels import CLOCK_END, CLOCK_SINK, run_frames
+from rtsim.simulation_setup import FlightSetup, Plant, build_parts, start_state
+
+RATE_HZ = 250
+"""Frames per second of every flight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """Who flies what: the same flights by another aircraft model or pilot show what a result depends on."""
+
+    name: str
+    """Short name."""
+    title: str
+    """For people."""
+    plant: Plant = "lpv"
+    """Aircraft model."""
+    outer_loop: OuterLoop = "integrators"
+    """How the pilot holds airspeed and altitude."""
+    pilot: PilotSettings | None = None
+    """Pilot settings other than the shipped ones; the gains are then designed anew."""
+    turbulence: float = 0.0
+    """Wind at 20 ft that sets the turbulence [m/s]; 0 is calm."""
+    seed: int = 0
+    """Root of the turbulence."""
+
+
+BASELINE = Variant(name="baseline", title="layered LPV, MOCM with integrators")
+VARIANTS: tuple[Variant, ...] = (
+    BASELINE,
+    Variant(name="nonlinear", title="nonlinear model", plant="nonlinear"),
+    Variant(name="two-variable", title="the paper's two-variable LPV", plant="lpv-plain"),
+    Variant(name="pi", title="the paper's outer PI loops", outer_loop="pi"),
+    Variant(name="slow-pilot", title="a pilot with 0.25 s of delay", pilot=PilotSettings(delay=0.25)),
+)
+"""What every claim about a flight is judged on; the first one counts, the others show how far it carries."""
+
+
+def paper_paths() -> dict[str, ConversionPath]:
+    """The paths of the paper's figures by name, and three more that show causes."""
+    return {
+        "typical": dataclasses.replace(table_1(), name="typical", nacelle_motion="spread"),
+        "typical_3deg": dataclasses.replace(table_1(nacelle_rate_deg_s=3.0), name="typical_3deg"),
+        "typical_8deg": dataclasses.replace(table_1(nacelle_rate_deg_s=8.0), name="typical_8deg"),
+        "fast_side": fast_side(),
+        "near_stall": near_stall(),
+        "centre_line": centre_line(),
+        "centre_line_variable": centre_line_variable(),
+        "fast_side_table_1_caps": dataclasses.replace(fast_side(caps=TABLE_1_CAPS), name="fast_side_table_1_caps"),
+        "near_stall_table_1_caps": dataclasses.replace(near_stall(caps=TABLE_1_CAPS), name="near_stall_table_1_caps"),
+        "centre_line_variable_3": dataclasses.replace(
+            centre_line_variable(acceleration_kt_s=3.0), name="centre_line_variable_3"
+        ),
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flight:
+    """One flight and how it ended."""
+
+    path: str
+    """Name of the path, a key of :func:`paper_paths`."""
+    programme: Programme
+    """What was asked for."""
+    rows: FloatArray
+    """The frame history, shape (frames, SIGNAL_COUNT)."""
+    end_reason: str
+    """Why it ended before its time; empty where it was completed."""
+
+    def __getitem__(self, signal: str) -> FloatArray:
+        """One signal over the flight, shape (frames,), in the unit of its name.
+
+        Args:
+            signal: One of ``rtsim.frame.SIGNAL_NAMES``.
+        """
+        column: FloatArray = self.rows[:, SIGNAL_NAMES.index(signal)]
+        return column
+
+    @property
+    def time(self) -> FloatArray:
+        """Time of the frames [s], shape (frames,)."""
+        return self["time_s"]
+
+    @property
+    def completed(self) -> bool:
+        """Whether it was flown to its end."""
+        return not self.end_reason
+
+
+class Flyer:
+    """Flies paths by one variant; the aircraft is loaded and a pilot designed once."""
+
+    def __init__(self, variant: Variant, *, jobs: int = 1) -> None:
+        """Prepare the variant.
+
+        Args:
+            variant: Who flies what.
+            jobs: Processes for the design of a pilot.
+        """
+        self.variant = variant
+        self._pilot = _designed_pilot(variant, jobs) if variant.pilot is not None else None
+
+    def fly(self, name: str, path: ConversionPath) -> Flight:
+        """Fly one path to its end.
+
+        Args:
+            name: What the flight is called.
+            path: The path.
+        """
+        programme, variant = path.programme(), self.variant
+        air = AirSpecification()
+        if variant.turbulence:
+            air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=variant.turbulence))
+        setup = FlightSetup(
+            programme=programme,
+            plant=variant.plant,
+            outer_loop=variant.outer_loop,
+            rate_hz=RATE_HZ,
+            air=air,
+            seed=variant.seed,
+        )
+        parts = build_parts(setup)
+        if self._pilot is not None:
+            parts = dataclasses.replace(parts, tables=parts.tables._replace(pilot=self._pilot))
+        # The same stream and order as rtsim.simulation: such a flight has the same history to the last bit.
+        random = stream_generator(variant.seed, STREAM_TURBULENCE)
+        state = start_state(setup, parts, random.standard_normal(3))
+        frames = max(1, math.ceil(programme.duration * RATE_HZ - 1e-6))
+        rows = np.zeros((frames, SIGNAL_COUNT))
+        noise = np.zeros((frames, 0))
+        air_noise = random.standard_normal((frames, normals_needed(state.gusts)))
+        flown = int(run_frames(parts.tables, state, parts.scratch, noise, air_noise, rows))
+        reason = END_REASONS[int(state.clock[CLOCK_END])].format(sink=float(state.clock[CLOCK_SINK]))
+        return Flight(name, programme, rows[:flown], reason)
+
+
+def _designed_pilot(variant: Variant, jobs: int) -> PilotTables:
+    """Gains of a pilot with other settings, at every grid point."""
+    from rtsim.lpv.aircraft import load_aircraft
+    from rtsim.pilot.schedule import design_schedule
+    from rtsim.pilot.tables import pack_pilot
+
+    database = load_aircraft().database
+    schedule = design_schedule(database, outer_loop=variant.outer_loop, settings=variant.pilot, jobs=jobs)
+    return pack_pilot(database, schedule, dt=1 / RATE_HZ)
+
+
+__all__ = ["BASELINE", "RATE_HZ", "VARIANTS", "Flight", "Flyer", "Variant", "paper_paths"]

@@ -1,0 +1,141 @@
+"""Flies everything the paper's figures and claims need, in parallel, and judges the claims."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from rtsim.optimization.path import ConversionPath
+from scenarios.reproduction.claims import Claim, judge_claims
+from scenarios.reproduction.evidence import (
+    Evidence,
+    corridor_differences,
+    grid_errors,
+    lpv_differences,
+    twelve_seconds,
+    valley_and_ridges,
+)
+from scenarios.reproduction.flights import BASELINE, VARIANTS, Flight, Flyer, Variant, paper_paths
+from scenarios.reproduction.measures import FlightMeasures, measure
+
+REFERENCE_CORRIDOR = {
+    "nacelle_deg": [90.0, 75.0, 60.0, 50.0, 45.0, 40.0, 30.0, 20.0, 10.0, 0.0],
+    "low_kt": [0.0, 0.0, 55.4, 66.7, 71.3, 75.3, 82.6, 89.1, 95.2, 101.0],
+    "high_kt": [125.0, 140.0, 155.0, 165.0, 170.0, 170.0, 170.0, 170.0, 170.0, 170.0],
+}
+"""Corners read from NASA TM X-62407, Figures 4.1.1 and 5.4.1 (13 000 lb, V_C), to 1.5 kn."""
+TRUTH, PLAIN = "nonlinear", "two-variable"
+"""Variants that the LPV form is compared with."""
+DESIGN_WEIGHT = 8
+"""What the design of a pilot counts in the progress, in flights."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Study:
+    """Everything that was flown and judged."""
+
+    flights: Mapping[str, Flight]
+    """The baseline's flights by path."""
+    paths: Mapping[str, ConversionPath]
+    """The paths."""
+    claims: tuple[Claim, ...]
+    """The claims, in the paper's order."""
+    evidence: Mapping[str, Evidence]
+    """What each variant shows, by its name."""
+    database_hash: str
+    """Hash of the LPV database that was flown."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Flown:
+    """One variant's part of the work."""
+
+    variant: Variant
+    measures: dict[str, FlightMeasures]
+    flights: dict[str, Flight]
+    """Only what is needed later: all of the baseline, one conversion of the others."""
+
+
+def work_amount(variants: tuple[Variant, ...] = VARIANTS) -> int:
+    """Amount of work of a study, in the unit of its progress: one flight.
+
+    Args:
+        variants: Who flies.
+    """
+    return (
+        len(variants) * len(paper_paths()) + DESIGN_WEIGHT * sum(variant.pilot is not None for variant in variants) + 2
+    )
+
+
+def run_study(
+    *, jobs: int = 1, progress: Callable[[float], None] | None = None, variants: tuple[Variant, ...] = VARIANTS
+) -> Study:
+    """Fly and judge.
+
+    Args:
+        jobs: Processes to use; the result does not depend on it.
+        progress: Called with the work done since the last call; it adds up to :func:`work_amount`.
+        variants: Who flies; the first one is what counts. ``nonlinear`` and ``two-variable`` must be among them.
+    """
+    advance = progress if progress is not None else _ignore
+    flown: dict[str, _Flown] = {}
+    # The longest work first, so that the processes end together.
+    order = sorted(variants, key=lambda variant: (variant.pilot is None, variant.plant != "nonlinear"))
+    for part in _all_flown(order, jobs, advance):
+        flown[part.variant.name] = part
+    base = flown[variants[0].name]
+    facts = {
+        "fig1_corridor": corridor_differences(REFERENCE_CORRIDOR),
+        "fig6_map": valley_and_ridges(),
+        "text_12_s": twelve_seconds(),
+        "text_lpv_accuracy": lpv_differences(
+            base.flights["typical"], flown[PLAIN].flights["typical"], flown[TRUTH].flights["typical"]
+        ),
+    }
+    advance(1.0)
+    facts |= grid_errors()
+    advance(1.0)
+    evidence = {variant.name: Evidence(flown[variant.name].measures, facts) for variant in variants}
+    others = {variant: evidence[variant.name] for variant in variants[1:]}
+    from rtsim.lpv.storage import load_database
+
+    return Study(
+        flights=base.flights,
+        paths=paper_paths(),
+        claims=judge_claims(evidence[variants[0].name], others),
+        evidence=evidence,
+        database_hash=load_database().content_hash,
+    )
+
+
+def _all_flown(order: list[Variant], jobs: int, advance: Callable[[float], None]) -> list[_Flown]:
+    if jobs == 1:
+        return [_fly_variant(variant, advance) for variant in order]
+    from joblib import Parallel, delayed
+
+    done = []
+    tasks = (delayed(_fly_variant)(variant, None) for variant in order)
+    for part in Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks):
+        done.append(part)
+        advance(len(part.measures) + (DESIGN_WEIGHT if part.variant.pilot is not None else 0))
+    return done
+
+
+def _fly_variant(variant: Variant, advance: Callable[[float], None] | None) -> _Flown:
+    """Fly and measure all paths by one variant."""
+    flyer = Flyer(variant)
+    if variant.pilot is not None and advance is not None:
+        advance(DESIGN_WEIGHT)
+    measures, flights = {}, {}
+    for name, path in paper_paths().items():
+        flight = flyer.fly(name, path)
+        measures[name] = measure(flight)
+        if variant.name == BASELINE.name or name == "typical":
+            flights[name] = flight
+        if advance is not None:
+            advance(1.0)
+    return _Flown(variant, measures, flights)
+
+
+def _ignore(_: float) -> None:
+    pass
