@@ -33,6 +33,7 @@ from rtsim.faults.fault_kernels import (
 )
 from rtsim.frame import COLUMN
 from rtsim.lpv.lpv_kernels import LpvTables
+from rtsim.nacelle.automatic_kernels import AutomaticTables, automatic_advance, automatic_rate
 from rtsim.nacelle.nacelle_kernels import (
     NacelleTables,
     nacelle_advance,
@@ -93,6 +94,8 @@ class SimulationTables(NamedTuple):
     """The nonlinear aircraft where it flies; else what the frame reads of it."""
     nacelle: NacelleTables
     """Conversion actuator."""
+    automatic: AutomaticTables
+    """Automatic nacelle control; where active, it sets the nacelle rate whoever flies."""
     corridor: CorridorTables
     """Boundaries and levels."""
     pilot: PilotTables
@@ -120,6 +123,8 @@ class SimulationState(NamedTuple):
     """Inputs that acted last."""
     nacelle: FloatArray
     """Actuator: command angle, angle, rate."""
+    automatic: FloatArray
+    """Automatic nacelle control: filtered airspeed, rate commanded last, whether it has begun."""
     reference: FloatArray
     """Filtered airspeed reference and its rate."""
     level: FloatArray
@@ -246,7 +251,12 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     ahead = programme_at(tables.programme, 3, time + tables.dt)
     target[3] = (ahead - target[2]) / tables.dt
     wanted = programme_at(tables.programme, 2, time + tables.dt)
-    target[4] = nacelle_assigned_rate(tables.nacelle, (wanted - state.nacelle[0]) / tables.dt)
+    wanted_rate = (wanted - state.nacelle[0]) / tables.dt
+    if tables.automatic.active != 0:
+        wanted_rate = automatic_rate(
+            tables.automatic, state.automatic, scratch.shown[0], y[OUTPUT.airspeed_rate], state.nacelle[0], tables.dt
+        )
+    target[4] = nacelle_assigned_rate(tables.nacelle, wanted_rate)
 
     row[COLUMN.frame] = frame
     row[COLUMN.time_s] = time
@@ -382,7 +392,10 @@ def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, ap
         acting[0], acting[1] = state.u[INPUT.stick], state.u[INPUT.lever]
         angle, dt = scratch.motion[0], tables.dt
         aids_step(tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, acting, dt)
-    acting[2] = nacelle_assigned_rate(tables.nacelle, applied[2])
+    if tables.automatic.active != 0:
+        acting[2] = scratch.target[4]
+    else:
+        acting[2] = nacelle_assigned_rate(tables.nacelle, applied[2])
 
 
 @inner_kernel
@@ -504,6 +517,9 @@ def complete(
     if state.clock[CLOCK_MODE] == MODE_MOCM:
         scalars = (angle, scratch.motion[1], dt)
         mocm_advance_in(tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, noise, scratch.pilot)
+    if tables.automatic.active != 0:
+        speed_rate = scratch.y[OUTPUT.airspeed_rate]
+        automatic_advance(tables.automatic, state.automatic, scratch.shown[0], speed_rate, rate, dt)
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = stick
     u[INPUT.lever] = lever

@@ -24,6 +24,8 @@ from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables
 from rtsim.nacelle import load_nacelle_tables
+from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
+from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
@@ -77,6 +79,8 @@ class FlightSetup:
     """Gusts and turbulence."""
     faults: tuple[Fault, ...] = ()
     """Failures and their times."""
+    automatic_nacelle: AutomaticNacelle | None = None
+    """Automatic nacelle control, which sets the nacelle rate whoever flies; None: the pilot does."""
     protection: str = "off"
     """Protection laws in the order in which they act, separated by commas: ``off``, ``monitor``, ``governor``,
     ``full``, ``MODULE:CLASS`` or an entry point."""
@@ -145,6 +149,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
         aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
         nacelle=load_nacelle_tables(),
+        automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
         corridor=load_corridor(setup.corridor).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
         aids=design_aids(database),
@@ -209,6 +214,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> ke
         x=parts.start_x.copy(),
         u=u,
         nacelle=new_actuator_state(nacelle),
+        automatic=np.zeros(AUTOMATIC_STATE_SIZE),
         reference=np.array([airspeed, 0.0]),
         level=new_level_state(),
         pilot=np.zeros(pilot_state_size(parts.tables.pilot)),

@@ -14,6 +14,7 @@ from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
 from rtsim.units import deg, kt
 from scenarios.disturbances import air_of, disturbance_problems, faults_of
 from scenarios.metrics import METRIC_NAMES
+from scenarios.nacelle_laws import automatic_problems, automatic_settings
 from scenarios.problems import closest, explain, suggestion
 from scenarios.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
 from scenarios.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
@@ -155,6 +156,7 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     if content.programme is not None:
         found += _point_contradictions(content.programme, file)
     found += disturbance_problems(content.air, content.faults, file)
+    found += automatic_problems(content.automatic, content.flight.nacelle, file)
     for number, clause in enumerate(content.expect):
         key = f"expect[{number}]"
         if clause.metric not in METRIC_NAMES:
@@ -262,6 +264,8 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         ),
         source=text,
         file=file,
+        nacelle=options.nacelle,
+        automatic=automatic_settings(content.automatic),
     )
 
 

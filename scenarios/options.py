@@ -33,6 +33,8 @@ class Overrides:
     outer_loop: OuterLoop | None = None
     pilot: str | None = None
     protection: Protection | None = None
+    nacelle: str | None = None
+    """Who sets the nacelle rate: ``programme``, ``automatic`` or MODULE:CLASS."""
     corridor: CorridorName | None = None
     rate_hz: int | None = None
     seed: int | None = None
@@ -106,6 +108,8 @@ def _with_options(scenario: Scenario, overrides: Overrides) -> Scenario:
         if getattr(overrides, name) is not None
     }
     changed = dataclasses.replace(scenario, **plain)
+    if overrides.nacelle is not None:
+        changed = dataclasses.replace(changed, nacelle=overrides.nacelle)
     _check_range("--rate", changed.rate_hz, RATE_RANGE, "Hz")
     _check_range("--wind-kt", changed.wind, WIND_RANGE, "kn", unit=kt(1.0))
     _check_range("--seed", changed.seed, (0, 2**63 - 1), "")

@@ -27,6 +27,7 @@ from scenarios.hands import Hands
 from scenarios.loader import load_scenario
 from scenarios.mavlink_options import MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
 from scenarios.metrics import flight_metrics
+from scenarios.nacelle_laws import automatic_nacelle, load_nacelle_law
 from scenarios.options import Overrides, refuse_unavailable, with_overrides
 from scenarios.pilots import load_pilot
 from scenarios.record import FlightRecord, judge
@@ -102,6 +103,7 @@ def fly(
     policy = OverrunPolicy.parse(overrun_policy)
     outputs = outputs if outputs is not None else FlightOutputs()
     pilot_factory = load_pilot(scenario.pilot)
+    nacelle_law = load_nacelle_law(scenario.nacelle)
     live = speed != "max"
     control = control if control is not None else FlightControl()
     link: MavlinkLink | None = None
@@ -120,6 +122,7 @@ def fly(
             pilot_factory=pilot_factory,
             pilot_name=scenario.pilot,
             hands=hands,
+            nacelle_law=nacelle_law,
         )
         log = _start_log(scenario, simulation, outputs, live=live)
         sinks = FlightSinks(
@@ -185,6 +188,7 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         aids=scenario.aids,
         air=scenario.air,
         faults=scenario.faults,
+        automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),
     )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from rtsim.atmosphere import AirSpecification
 from rtsim.faults import Fault
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
+from scenarios.nacelle_laws import AutomaticSettings
 
 PlantName = Literal["lpv", "lpv-plain", "nonlinear"]
 OuterLoop = Literal["integrators", "pi"]
@@ -110,6 +111,10 @@ class Scenario:
     """Text of the file it came from; empty for scenarios made in Python."""
     file: str
     """Where it came from, as shown in messages."""
+    nacelle: str = "programme"
+    """Who sets the nacelle rate: ``programme`` (the pilot, as the programme asks), ``automatic``, or MODULE:CLASS."""
+    automatic: AutomaticSettings = field(default_factory=AutomaticSettings)
+    """Settings of the automatic nacelle control."""
 
     @property
     def corridor_name(self) -> CorridorName:

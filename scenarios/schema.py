@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
 from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
+from scenarios.nacelle_laws import AutomaticTable, NacelleName
 from scenarios.scenario import AidName
 
 FORMAT = 1
@@ -41,7 +42,7 @@ class FlightTable(Strict):
     pilot: PilotName = "mocm"
     corridor: Literal["design", "flight"] | None = None
     protection: Literal["off", "monitor", "governor", "full"] = "monitor"
-    nacelle: Literal["programme"] = "programme"
+    nacelle: NacelleName = "programme"
     rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     wind_kt: Annotated[float, Field(ge=-40.0, le=40.0, allow_inf_nan=False)] = 0.0
@@ -148,6 +149,7 @@ class ScenarioFile(Strict):
     flight: FlightTable = FlightTable()
     start: StartTable = StartTable()
     programme: ProgrammeTable | None = None
+    automatic: AutomaticTable | None = None
     air: AirTable = AirTable()
     faults: Annotated[list[FaultTable], Field(max_length=1000)] = []
     events: list[EventTable] = []

@@ -17,6 +17,7 @@ from rtsim.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.simulation_kernels import END_GENTLE_LANDING
 from scenarios.disturbances import disturbance_event
 from scenarios.hands import Hands, pilot_modes
+from scenarios.nacelle_laws import NacelleLawFactory, NacelleLawGuard
 from scenarios.pilots import PilotFactory
 from scenarios.scenario import PilotMode, ScenarioEvent
 from telemetry.log_format import LogEvent
@@ -49,6 +50,7 @@ class FlightSession:
         pilot_factory: PilotFactory | None = None,
         pilot_name: str = "mocm",
         hands: Hands | None = None,
+        nacelle_law: NacelleLawFactory | None = None,
     ) -> None:
         """Prepare a flight from the simulation's present state, which must be frame 0.
 
@@ -59,6 +61,7 @@ class FlightSession:
             pilot_factory: Makes the pilot plug-in; None where the built-in pilot flies alone.
             pilot_name: How the pilot is called in messages.
             hands: A person who may fly by MAVLink; None where there is no MAVLink.
+            nacelle_law: Makes the law that sets the nacelle rate; None where pilot or built-in law do.
         """
         self.simulation = simulation
         self.rows = 0
@@ -76,6 +79,7 @@ class FlightSession:
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
         self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
         self._hands = hands
+        self._nacelle_law = NacelleLawGuard(nacelle_law) if nacelle_law is not None else None
         self._failure = ""
 
     @property
@@ -121,6 +125,8 @@ class FlightSession:
             command = hands.before(self)
         elif self._pilot is not None and simulation.mode == "external":
             command = self._ask_pilot(self._pilot)
+        if self._nacelle_law is not None and simulation.mode != "hold":
+            command = self._tilt(self._nacelle_law, command)
         # A run of one frame is the same frame as a step, in one call of compiled code instead of three.
         row: FloatArray = simulation.run(1)[0] if command is None else simulation.step(command)
         self.rows += 1
@@ -146,7 +152,8 @@ class FlightSession:
             self._tell_failures()
         if self._next_failure < len(self._failures):
             frames = min(frames, self._failures[self._next_failure][0] - self.simulation.frame_index)
-        if self._hands is None and (self._pilot is None or self.simulation.mode != "external"):
+        by_code = self._hands is not None or self._nacelle_law is not None
+        if not by_code and (self._pilot is None or self.simulation.mode != "external"):
             rows = self.simulation.run(frames)
             self.rows += len(rows)
             return rows
@@ -166,6 +173,8 @@ class FlightSession:
             self._pilot = self._pilot_factory()
         if self._hands is not None:
             self._hands.reset(self.simulation)
+        if self._nacelle_law is not None:
+            self._nacelle_law.reset()
 
     def switch_pilot(self, pilot: str) -> None:
         """Hand the controls over from the coming frame on.
@@ -258,6 +267,15 @@ class FlightSession:
         self._tell("pilot_failed", self._failure, level="warning")
         self.switch_pilot("hold")
         return None
+
+    def _tilt(self, law: NacelleLawGuard, command: Command | None) -> Command:
+        """The pilot's command with the law's nacelle rate; a law that has failed leaves it as it is."""
+        simulation = self.simulation
+        command = simulation.pilot_command() if command is None else command
+        changed, failure = law.step(simulation.sensors(), command, simulation.dt)
+        if failure:
+            self._tell("nacelle_law_failed", f"{failure}; the pilot sets the nacelles", level="warning")
+        return changed
 
     def _tell(self, kind: str, text: str, data: dict[str, Any] | None = None, *, level: str = "info") -> None:
         if self.on_event is not None:

@@ -50,6 +50,9 @@ def fly_command(
     protection: Annotated[
         Literal["off", "monitor", "governor", "full"] | None, typer.Option(help="What to do about the corridor.")
     ] = None,
+    nacelle: Annotated[
+        str | None, typer.Option(help="Who sets the nacelle rate: programme, automatic or MODULE:CLASS.")
+    ] = None,
     corridor: Annotated[Literal["design", "flight"] | None, typer.Option(help="Boundaries to watch.")] = None,
     speed: Annotated[str, typer.Option(help="Multiple of real time, or max.")] = "1",
     rate: Annotated[int | None, typer.Option(help="Frames per second [Hz].", show_default="250")] = None,
@@ -94,6 +97,7 @@ def fly_command(
         plant: Model to fly.
         outer_loop: How the MOCM holds airspeed and altitude.
         protection: What to do about the corridor.
+        nacelle: Who sets the nacelle rate.
         corridor: Boundaries to watch.
         speed: Multiple of real time, or max.
         rate: Frames per second [Hz].
@@ -127,6 +131,7 @@ def fly_command(
     """
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
+    from scenarios.nacelle_laws import load_nacelle_law
     from scenarios.options import Overrides, chosen_scenario, refuse_unavailable
     from scenarios.pilots import HAND_PILOT, load_pilot
 
@@ -136,6 +141,7 @@ def fly_command(
         outer_loop=outer_loop,
         pilot=pilot,
         protection=protection,
+        nacelle=nacelle,
         corridor=corridor,
         rate_hz=rate,
         seed=seed,
@@ -151,6 +157,7 @@ def fly_command(
     chosen = chosen_scenario(scenario, overrides)
     refuse_unavailable(chosen)
     load_pilot(chosen.pilot)
+    load_nacelle_law(chosen.nacelle)
     link = None
     if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
         from scenarios.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced
