@@ -57,16 +57,23 @@ class Claim:
 
     @property
     def why(self) -> str:
-        """Why it holds or not, and with which other aircraft models and pilots."""
-        why = (self.text.holds if self.holds else self.text.fails).format(**self.measured)
+        """Why it holds or not."""
+        return (self.text.holds if self.holds else self.text.fails).format(**self.measured)
+
+    @property
+    def carried(self) -> str:
+        """With which other aircraft models and pilots the verdict is the same; empty where no flight is involved."""
         same = [title for title, holds in self.variants.items() if holds is self.holds]
         other = [title for title, holds in self.variants.items() if holds is not self.holds]
         verdict = "holds" if self.holds else "fails"
-        if same:
-            why += f" It {verdict} with {_listed(same)} too."
+        sentences = []
+        if same and not other:
+            sentences.append(f"{verdict.capitalize()} with every other aircraft model and pilot too.")
+        elif same:
+            sentences.append(f"{verdict.capitalize()} with {_listed(same)} too.")
         if other:
-            why += f" It {'fails' if self.holds else 'holds'} with {_listed(other)}."
-        return why
+            sentences.append(f"{'Fails' if self.holds else 'Holds'} with {_listed(other)}.")
+        return " ".join(sentences)
 
     def to_json(self) -> dict[str, Any]:
         """The claim as JSON values: ``id``, ``holds``, ``measured``, ``expected`` and the texts."""
@@ -80,6 +87,7 @@ class Claim:
             "paper": self.text.paper,
             "found": self.measured_text,
             "why": self.why,
+            "carried": self.carried,
             "variants": dict(self.variants),
         }
 

@@ -163,7 +163,7 @@ def time_axis(axes: Axes, label: str, *, last: bool = True) -> None:
         last: Whether it carries the label of the time axis.
     """
     axes.set_ylabel(label)
-    axes.set_xlim(left=0.0)
+    axes.margins(x=0.0)  # limits set by hand would clip a longer flight drawn later
     if last:
         axes.set_xlabel("time, s")
 
@@ -194,6 +194,7 @@ def save_figures(
     with mpl.rc_context(STYLE):
         for plan in plans:
             figure = Figure(figsize=plan.size, layout="constrained")
+            figure.suptitle(f"Figure {plan.number}. {plan.title}", x=0.01, ha="left", fontsize=10.5)
             plan.draw(study, figure)
             files[plan.number] = []
             for suffix in FORMATS:

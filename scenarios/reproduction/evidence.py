@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,10 @@ from rtsim.optimization.paths import centre_line_corners, trim_flapping_map
 from rtsim.units import deg, kt, to_deg, to_kt
 from scenarios.reproduction.flights import Flight, Flyer, Variant
 from scenarios.reproduction.measures import FlightMeasures
+
+if TYPE_CHECKING:
+    from rtsim.lpv.checks import NeighbourError
+    from rtsim.lpv.database import Database
 
 COMPARED = ("airspeed_kt", "altitude_m", "pitch_deg", "flapping_deg")
 """Signals by which an LPV form is judged against the nonlinear model."""
@@ -103,13 +108,8 @@ def grid_errors() -> dict[str, dict[str, Number]]:
         **{name: getattr(database, name)[:, kept] for name in _DATABASE_ARRAYS},
     )
     coarse = check_neighbours(sparse, inside=inside[kept])
-    low, high = kt(19.0), kt(61.0)  # the steps of 10 kn; above, multiples of the present grid's 3.5 kn give 7 kn
-    pairs = [
-        error
-        for error in coarse.errors
-        if error.axis == "airspeed"
-        and all(low <= sparse.airspeed[point[0]] <= high for point in (error.start, error.end))
-    ]
+    # The steps of 10 kn; above, multiples of the present grid's 3.5 kn give 7 kn.
+    pairs = _between(sparse, coarse.errors, 19.0, 61.0)
     worst = max(pairs, key=lambda error: error.error)
     return {
         "fig2_grid": {
@@ -124,8 +124,29 @@ def grid_errors() -> dict[str, dict[str, Number]]:
             "share_above": float(np.mean([error.error > 0.01 for error in pairs])),
             "worst_airspeed_kt": to_kt(float(sparse.airspeed[worst.start[0]])),
             "worst_nacelle_deg": to_deg(float(sparse.nacelle[worst.start[1]])),
+            "hover_largest_error": max(_errors_between(sparse, coarse.errors, -21.0, 21.0)),
+            "fast_pairs_above": float(
+                sum(error > 0.01 for error in _errors_between(sparse, coarse.errors, 60.0, 171.0))
+            ),
+            "fast_pairs": float(len(_errors_between(sparse, coarse.errors, 60.0, 171.0))),
         },
     }
+
+
+def _between(grid: Database, errors: Sequence[NeighbourError], low_kt: float, high_kt: float) -> list[NeighbourError]:
+    """Pairs of neighbouring airspeeds within a range, flaps alike."""
+    low, high = kt(low_kt), kt(high_kt)
+    return [
+        error
+        for error in errors
+        if error.axis == "airspeed"
+        and not error.flap_moves
+        and all(low <= grid.airspeed[point[0]] <= high for point in (error.start, error.end))
+    ]
+
+
+def _errors_between(grid: Database, errors: Sequence[NeighbourError], low_kt: float, high_kt: float) -> list[float]:
+    return [error.error for error in _between(grid, errors, low_kt, high_kt)]
 
 
 def _thinned(airspeed: FloatArray) -> npt.NDArray[np.int64]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtsim.corridor import load_corridor
 from rtsim.optimization.paths import trim_flapping_map
 from rtsim.units import to_deg, to_kt
 from scenarios.reproduction.drawing import (
@@ -39,14 +40,16 @@ def _corridor(study: Study, figure: Figure) -> None:  # noqa: ARG001
     draw_corridor(axes, flight=True)
     axes.text(20, 40, "stall and attitude limits", rotation=0, color="black", fontsize=9)
     axes.text(172, 45, "load limit (V$_C$)", rotation=90, va="center", fontsize=9)
-    nacelle = np.linspace(0.0, 90.0, 91)
-    from rtsim.corridor import load_corridor
-
-    centre = to_kt(1.0) * np.asarray(load_corridor("design").centre_speed(np.radians(nacelle)))
-    axes.plot(centre, nacelle, color=BLUE, linestyle="-.", label="centre line")
+    _centre_line(axes, BLUE)
     axes.annotate("helicopter mode", (2, 91.5), fontsize=9, color=GREY)
     axes.annotate("airplane mode", (102, -3.2), fontsize=9, color=GREY)
     axes.legend(loc="lower left")
+
+
+def _centre_line(axes: Axes, colour: str = GREY) -> None:
+    nacelle = np.linspace(0.0, 90.0, 91)
+    centre = to_kt(1.0) * np.asarray(load_corridor("design").centre_speed(np.radians(nacelle)))
+    axes.plot(centre, nacelle, color=colour, linewidth=1.2, linestyle="-.", label="centre line")
 
 
 def _grid(study: Study, figure: Figure) -> None:  # noqa: ARG001
@@ -63,7 +66,7 @@ def _grid(study: Study, figure: Figure) -> None:  # noqa: ARG001
     missing = ~valid & shown
     axes.plot(speed[missing], nacelle[missing], "x", color=RED, markersize=2.6, alpha=0.45, label="no trim")
     axes.set(xlim=(-24, 265))
-    axes.legend(loc="upper right")
+    figure.legend(loc="outside lower center", ncols=2)
 
 
 def _box(axes: Axes, place: tuple[float, float], text: str, *, width: float = 2.2, colour: str = "#eaf1f8") -> None:
@@ -192,28 +195,39 @@ def _stall_path(study: Study, figure: Figure) -> None:
     axes.legend(loc="lower left")
 
 
-def _controls(study: Study, figure: Figure, name: str, other: tuple[str, str] | None) -> None:
-    collective, stick, lever = figure.subplots(3, 1, sharex=True)
+def _controls(study: Study, figure: Figure, flown: tuple[str, str], other: tuple[str, str]) -> Axes:
+    """Collective, stick and lever of two flights, each by path and label; gives the collective's axes."""
+    all_axes: list[Axes] = list(figure.subplots(3, 1, sharex=True))
+    collective, stick, lever = all_axes
     for axes, signal, scale, label in (
         (collective, "collective_75_deg", 1.0, "collective at\n0.75 R, deg"),
         (stick, "stick", STICK_HALF_TRAVEL_IN, "stick, in\n(forward +)"),
         (lever, "lever", 100.0, "lever, %"),
     ):
-        if other is not None:
-            draw_signal(axes, study, other[0], signal, colour=ORANGE, scale=scale, label=other[1])
-        draw_signal(axes, study, name, signal, scale=scale, label="this flight")
+        draw_signal(axes, study, other[0], signal, colour=ORANGE, scale=scale, label=other[1])
+        draw_signal(axes, study, flown[0], signal, scale=scale, label=flown[1])
         time_axis(axes, label, last=axes is lever)
-    if other is not None:
-        collective.legend(loc="upper left")
+    handles, labels = collective.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    figure.align_ylabels()
+    return collective
 
 
 def _stall_controls(study: Study, figure: Figure) -> None:
-    _controls(study, figure, "near_stall", ("typical_3deg", "Table 1 at 3 deg/s"))
+    collective = _controls(
+        study, figure, ("near_stall", "along the stall limit"), ("typical_3deg", "Table 1 at 3 deg/s")
+    )
+    zoom = collective.inset_axes((0.06, 0.36, 0.35, 0.62))
+    for name, colour in (("typical_3deg", ORANGE), ("near_stall", BLUE)):
+        draw_signal(zoom, study, name, "collective_75_deg", colour=colour)
+    zoom.set(xlim=(0.0, 32.0), ylim=(8.5, 12.2))
+    zoom.tick_params(labelsize=8)
 
 
 def _centre_path(study: Study, figure: Figure) -> None:
     axes = figure.subplots()
     draw_corridor(axes)
+    _centre_line(axes)
     draw_path(axes, study, "centre_line", label="flown at 3 deg/s", corners=True)
     axes.legend(loc="lower left")
 
@@ -231,6 +245,7 @@ def _centre_acceleration(study: Study, figure: Figure) -> None:
 def _variable_path(study: Study, figure: Figure) -> None:
     axes = figure.subplots()
     draw_corridor(axes)
+    _centre_line(axes)
     draw_path(axes, study, "centre_line_variable", label="flown at 4 kn/s, nacelle rate variable")
     axes.legend(loc="lower left")
 
@@ -246,7 +261,7 @@ def _variable_rate(study: Study, figure: Figure) -> None:
     )
     draw_signal(axes, study, "centre_line", "nacelle_rate_deg_s", scale=-1.0, colour=ORANGE, label="constant, 3 deg/s")
     time_axis(axes, "nacelle rate towards\nairplane mode, deg/s")
-    axes.legend(loc="upper right")
+    axes.legend(loc="center right")
 
 
 def _variable_flapping(study: Study, figure: Figure) -> None:
@@ -257,7 +272,9 @@ def _variable_flapping(study: Study, figure: Figure) -> None:
 
 
 def _variable_controls(study: Study, figure: Figure) -> None:
-    _controls(study, figure, "centre_line_variable", ("centre_line", "constant rate, 3 deg/s"))
+    _controls(
+        study, figure, ("centre_line_variable", "variable rate, 4 kn/s"), ("centre_line", "constant rate, 3 deg/s")
+    )
 
 
 _TALL = (7.6, 5.6)
@@ -286,7 +303,8 @@ FIGURES: tuple[FigurePlan, ...] = (
     FigurePlan(
         4,
         "Typical conversion (Table 1)",
-        "Both readings of Table 1; circles: its points. Flown by the MOCM pilot on the layered LPV aircraft, calm air.",
+        "Both readings of Table 1; circles: its points. Flown by the MOCM pilot on the layered LPV aircraft, calm air. "
+        "Corners are rounded by the reference filters: airspeed follows 1.3 s late, the nacelles 0.7 s.",
         _typical_path,
     ),
     FigurePlan(
@@ -326,7 +344,8 @@ FIGURES: tuple[FigurePlan, ...] = (
     FigurePlan(
         10,
         "Flapping at 8 deg/s",
-        "Every motion of the nacelles rings the gimbal harder than at 3 deg/s.",
+        "Every motion of the nacelles rings the gimbal harder than at 3 deg/s. The trims are those of the flight at "
+        "8 deg/s.",
         _eight_flapping,
         HALF,
     ),
@@ -339,7 +358,8 @@ FIGURES: tuple[FigurePlan, ...] = (
     FigurePlan(
         12,
         "Controls along the stall limit",
-        "The collective falls steadily for 29 s; on Table 1 it climbs back each time the nacelles stop.",
+        "The collective falls steadily for half a minute; on Table 1 it climbs back each time the nacelles stop "
+        "(inset).",
         _stall_controls,
         _TALL,
     ),
@@ -372,14 +392,16 @@ FIGURES: tuple[FigurePlan, ...] = (
     FigurePlan(
         17,
         "Flapping at variable nacelle rate",
-        "The fast last tilt adds more than a degree to the trim, which the constant 3 deg/s does not.",
+        "The fast last tilt adds more than a degree to the trim, which the constant 3 deg/s does not. The trims are "
+        "those of the flight at variable rate.",
         _variable_flapping,
         HALF,
     ),
     FigurePlan(
         18,
         "Controls at variable nacelle rate",
-        "Larger and quicker stick and lever motions than at constant rate, for a shorter time.",
+        "Larger and quicker stick and lever motions than at constant rate, for a shorter time. The swinging of the "
+        "lever at 5 to 16 s belongs to the 4 kn/s, not to the nacelle rate: see the claim.",
         _variable_controls,
         _TALL,
     ),

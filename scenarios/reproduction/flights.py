@@ -49,7 +49,7 @@ class Variant:
 BASELINE = Variant(name="baseline", title="layered LPV, MOCM with integrators")
 VARIANTS: tuple[Variant, ...] = (
     BASELINE,
-    Variant(name="nonlinear", title="nonlinear model", plant="nonlinear"),
+    Variant(name="nonlinear", title="the nonlinear model", plant="nonlinear"),
     Variant(name="two-variable", title="the paper's two-variable LPV", plant="lpv-plain"),
     Variant(name="pi", title="the paper's outer PI loops", outer_loop="pi"),
     Variant(name="slow-pilot", title="a pilot with 0.25 s of delay", pilot=PilotSettings(delay=0.25)),

@@ -109,6 +109,10 @@ def _fig4_least_integral(evidence: Evidence, limits: Limits) -> Finding:
         found[f"{name}_mean_deg"] = flight.metrics.flapping_deg.integral_deg_s / flight.duration_s
     best = min(_PAPER_PATHS, key=lambda name: float(found[f"{name}_deg_s"]))
     found["best_path"] = best
+    for name in ("near_stall_table_1_caps", "fast_side_table_1_caps"):
+        found[f"{name}_deg_s"] = evidence.measures[name].metrics.flapping_deg.integral_deg_s
+    for key in ("ridge_90_deg", "ridge_90_kt", "ridge_75_deg", "ridge_75_kt"):
+        found[key] = evidence.facts["fig6_map"][key]
     return best == limits["best_path"], found
 
 
@@ -173,6 +177,7 @@ def _fig8_worse(evidence: Evidence, limits: Limits) -> Finding:
         "typical_peak_deg": typical.metrics.flapping_deg.peak,
         "fast_integral_deg_s": fast.metrics.flapping_deg.integral_deg_s,
         "fast_peak_deg": fast.metrics.flapping_deg.peak,
+        **evidence.facts["fig8_worse"],
         "fast_end": "" if fast.completed else f" (not flown to its end: {fast.end_reason})",
     }
 
@@ -209,6 +214,10 @@ def _fig12_collective_falls(evidence: Evidence, limits: Limits) -> Finding:
         "typical_rise_deg": typical.collective_rise_deg,
         "typical_fall_deg": typical.collective_fall_deg,
         "spread_rise_deg": evidence.measures["typical"].collective_rise_deg,
+        "falls_until_s": flight.collective_falls_until_s,
+        "typical_falls_until_s": typical.collective_falls_until_s,
+        "spread_falls_until_s": evidence.measures["typical"].collective_falls_until_s,
+        "hasty_falls_until_s": evidence.measures["near_stall_table_1_caps"].collective_falls_until_s,
     }
 
 

@@ -21,6 +21,8 @@ EARLY_S = 30.0
 """End of the early part, in which the paper's Figures 5 and 8 differ [s]."""
 COLLECTIVE_S = (1.0, 20.0)
 """The initial part of Figure 12 [s]."""
+CLIMB_DEG = 0.02
+"""The collective has stopped falling once it stands this far above its lowest value [deg]."""
 CENTRE_S = (42.0, 58.0)
 """The seconds the paper names for Figure 14 [s]."""
 LATE_NACELLE_DEG = 50.0
@@ -73,6 +75,8 @@ class FlightMeasures:
     """How far the collective climbs above its lowest value so far between 1 and 20 s [deg]."""
     collective_fall_deg: float
     """How far it falls between 1 and 20 s [deg]."""
+    collective_falls_until_s: float
+    """When it first climbs 0.02 deg above its lowest value so far, from 1 s on [s]."""
     centre_acceleration_kt_s: float
     """Mean acceleration between 42 and 58 s [kn/s]; NaN for shorter flights."""
     centre_acceleration_max_kt_s: float
@@ -185,8 +189,11 @@ def measure(flight: Flight) -> FlightMeasures:
         oscillation_peak_deg=float(np.abs(oscillation[settled]).max()),
         late_oscillation_rms_deg=_rms(oscillation[late]),
         late_oscillation_peak_deg=float(np.abs(oscillation[late]).max(initial=0.0)),
-        collective_rise_deg=float((initial - np.minimum.accumulate(initial)).max()),
+        collective_rise_deg=float(_climb(initial).max()),
         collective_fall_deg=float(initial[0] - initial.min()),
+        collective_falls_until_s=_first(
+            time[time >= COLLECTIVE_S[0]], _climb(collective[time >= COLLECTIVE_S[0]]) > CLIMB_DEG
+        ),
         centre_acceleration_kt_s=_mean(acceleration[centre]),
         centre_acceleration_max_kt_s=float(acceleration[centre & (time >= CENTRE_S[0] + 2.0)].max(initial=-np.inf)),
         tilt_acceleration_kt_s=_mean(acceleration[tilting]),
@@ -229,6 +236,11 @@ def rms_difference(one: Flight, other: Flight, signal: str) -> float:
     """
     frames = min(len(one.rows), len(other.rows))
     return _rms(one[signal][:frames] - other[signal][:frames])
+
+
+def _climb(values: FloatArray) -> FloatArray:
+    """How far each value lies above the lowest one so far."""
+    return values - np.minimum.accumulate(values)
 
 
 def _rms(values: FloatArray) -> float:

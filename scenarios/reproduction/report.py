@@ -87,7 +87,8 @@ def _claim_table(claims: Sequence[Claim]) -> str:
         rows.append(
             f'<tr id="{text.id}"><td><code>{text.id}</code><br><small>{_text(text.where)}</small></td>'
             f"<td>{_text(text.claim)}<br><small>{_text(text.paper)}</small></td>"
-            f"<td>{_text(claim.measured_text)}</td>{verdict}<td>{_text(claim.why)}</td></tr>"
+            f"<td>{_text(claim.measured_text)}</td>{verdict}"
+            f"<td>{_text(claim.why)}<br><small>{_text(claim.carried)}</small></td></tr>"
         )
     head = "<tr><th>id</th><th>claim, and what the paper says</th><th>measured</th><th>verdict</th><th>why</th></tr>"
     table = f'<table class="claims"><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table>'
