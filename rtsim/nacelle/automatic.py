@@ -117,8 +117,10 @@ class AutomaticNacelle:
     """How fast the filtered airspeed is drawn to the indicated one [1/s]; below it gusts pass, above it they do not."""
     lead: float = 2.0 / 3.0
     """How far ahead the schedule is read [s]: the lag of the critically damped 3 rad/s actuator in a ramp."""
-    detent_zone: float = deg(2.0)
+    detent_zone: float = deg(3.0)
     """Distance of the scheduled angle from a detent within which the nacelles pause [rad]."""
+    detent_gain: float = 5.0
+    """Gain where there are detents [1/s]: the nacelles must arrive before the schedule has left the zone."""
 
     def __post_init__(self) -> None:
         """Refuse rates the actuators cannot follow (:class:`InputError`)."""
@@ -129,7 +131,7 @@ class AutomaticNacelle:
                 value=round(to_deg(self.rate), 6),
                 allowed=f"more than 0, up to {to_deg(LARGEST_RATE):g} deg/s",
             )
-        for name in ("acceleration", "gain", "correction"):
+        for name in ("acceleration", "gain", "correction", "detent_gain"):
             if not (getattr(self, name) > 0.0 and np.isfinite(getattr(self, name))):
                 raise InputError("must be positive", key=f"nacelle {name}", value=getattr(self, name))
 
@@ -142,7 +144,7 @@ class AutomaticNacelle:
             nacelle=_array(self.schedule.nacelle),
             rate=float(self.rate),
             acceleration=float(self.acceleration),
-            gain=float(self.gain),
+            gain=float(self.detent_gain if self.detents else self.gain),
             correction=float(self.correction),
             lead=float(self.lead),
             detents=_array(tuple(float(angle) for angle in detents)),
