@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -139,6 +141,19 @@ def test_a_law_that_fails_is_reported_and_the_flight_goes_on():
     assert "LookupError: no schedule left" in events[0].text
     assert record.rows[2400, COLUMN.nacelle_deg] == pytest.approx(90.0)
     assert record.rows[-1, COLUMN.nacelle_deg] == pytest.approx(0.0, abs=0.1)
+
+
+def test_the_law_of_the_documentation_flies(tmp_path, monkeypatch):
+    page = (Path(__file__).resolve().parents[2] / "docs" / "nacelle.md").read_text(encoding="utf-8")
+    code = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[-1]
+    (tmp_path / "my_nacelles.py").write_text(code, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    record = fly("typical_conversion", speed="max", overrides=Overrides(nacelle="my_nacelles:StraightLine"))
+    assert record.completed
+    assert not [event for event in record.events if event.kind == "nacelle_law_failed"]
+    assert record.rows[-1, COLUMN.nacelle_deg] == pytest.approx(0.0, abs=0.1)
+    assert np.abs(record.rows[:, COLUMN.nacelle_rate_deg_s]).max() < 5.01
 
 
 def test_what_the_automatic_control_gains_over_table_1():
