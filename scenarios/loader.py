@@ -18,6 +18,7 @@ from scenarios.nacelle_laws import automatic_problems, automatic_settings
 from scenarios.problems import closest, explain, suggestion
 from scenarios.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
 from scenarios.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
+from scenarios.verdict_trial import pulses_of, trial_of, trial_problems
 
 MAX_FILE_BYTES = 4_000_000
 """A scenario file larger than this is refused before it is read [bytes]."""
@@ -157,6 +158,7 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
         found += _point_contradictions(content.programme, file)
     found += disturbance_problems(content.air, content.faults, file)
     found += automatic_problems(content.automatic, content.flight.nacelle, file)
+    found += trial_problems(content.pulses, content.trial, has_events=bool(content.events), file=file)
     for number, clause in enumerate(content.expect):
         key = f"expect[{number}]"
         if clause.metric not in METRIC_NAMES:
@@ -266,6 +268,8 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         file=file,
         nacelle=options.nacelle,
         automatic=automatic_settings(content.automatic),
+        pulses=pulses_of(content.pulses),
+        trial=trial_of(content.trial),
     )
 
 

@@ -32,6 +32,7 @@ from scenarios.options import Overrides, refuse_unavailable, with_overrides
 from scenarios.pilots import load_pilot
 from scenarios.record import FlightRecord, judge
 from scenarios.scenario import Scenario
+from scenarios.script_hands import ScriptHands
 from scenarios.session import FlightSession
 from scenarios.sinks import FlightSinks
 from telemetry.corridor_outline import CorridorOutline
@@ -123,6 +124,7 @@ def fly(
             pilot_name=scenario.pilot,
             hands=hands,
             nacelle_law=nacelle_law,
+            script=ScriptHands(scenario.pulses) if scenario.pulses else None,
         )
         log = _start_log(scenario, simulation, outputs, live=live)
         sinks = FlightSinks(

@@ -10,6 +10,8 @@ from rtsim.faults import Fault
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
 from scenarios.nacelle_laws import AutomaticSettings
+from scenarios.script import Pulse
+from scenarios.verdict_trial import Trial
 
 PlantName = Literal["lpv", "lpv-plain", "nonlinear"]
 OuterLoop = Literal["integrators", "pi"]
@@ -115,6 +117,10 @@ class Scenario:
     """Who sets the nacelle rate: ``programme`` (the pilot, as the programme asks), ``automatic``, or MODULE:CLASS."""
     automatic: AutomaticSettings = field(default_factory=AutomaticSettings)
     """Settings of the automatic nacelle control."""
+    pulses: tuple[Pulse, ...] = ()
+    """What scripted hands do to the controls besides the pilot."""
+    trial: Trial | None = None
+    """What makes it a test of envelope protection; None where it is none."""
 
     @property
     def corridor_name(self) -> CorridorName:

@@ -14,6 +14,7 @@ from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
 from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
 from scenarios.nacelle_laws import AutomaticTable, NacelleName
 from scenarios.scenario import AidName
+from scenarios.verdict_schema import PulseTable, TrialTable
 
 FORMAT = 1
 """Version of the layout; a file states it, so that later layouts can still read it."""
@@ -152,5 +153,7 @@ class ScenarioFile(Strict):
     automatic: AutomaticTable | None = None
     air: AirTable = AirTable()
     faults: Annotated[list[FaultTable], Field(max_length=1000)] = []
+    pulses: Annotated[list[PulseTable], Field(max_length=1000)] = []
     events: list[EventTable] = []
     expect: list[ExpectTable] = []
+    trial: TrialTable | None = None

@@ -20,6 +20,7 @@ from scenarios.hands import Hands, pilot_modes
 from scenarios.nacelle_laws import NacelleLawFactory, NacelleLawGuard
 from scenarios.pilots import PilotFactory
 from scenarios.scenario import PilotMode, ScenarioEvent
+from scenarios.script_hands import ScriptHands
 from telemetry.log_format import LogEvent
 
 PILOT_WORDS: dict[PilotMode, str] = {
@@ -50,6 +51,7 @@ class FlightSession:
         pilot_factory: PilotFactory | None = None,
         pilot_name: str = "mocm",
         hands: Hands | None = None,
+        script: ScriptHands | None = None,
         nacelle_law: NacelleLawFactory | None = None,
     ) -> None:
         """Prepare a flight from the simulation's present state, which must be frame 0.
@@ -61,6 +63,7 @@ class FlightSession:
             pilot_factory: Makes the pilot plug-in; None where the built-in pilot flies alone.
             pilot_name: How the pilot is called in messages.
             hands: A person who may fly by MAVLink; None where there is no MAVLink.
+            script: What a script does to the built-in pilot's commands; None where there is none.
             nacelle_law: Makes the law that sets the nacelle rate; None where pilot or built-in law do.
         """
         self.simulation = simulation
@@ -79,6 +82,7 @@ class FlightSession:
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
         self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
         self._hands = hands
+        self._script = script
         self._nacelle_law = NacelleLawGuard(nacelle_law) if nacelle_law is not None else None
         self._failure = ""
 
@@ -125,6 +129,8 @@ class FlightSession:
             command = hands.before(self)
         elif self._pilot is not None and simulation.mode == "external":
             command = self._ask_pilot(self._pilot)
+        elif self._script is not None and simulation.mode == "mocm":
+            command = self._script.command(simulation)
         if self._nacelle_law is not None and simulation.mode != "hold":
             command = self._tilt(self._nacelle_law, command)
         # A run of one frame is the same frame as a step, in one call of compiled code instead of three.
@@ -152,8 +158,9 @@ class FlightSession:
             self._tell_failures()
         if self._next_failure < len(self._failures):
             frames = min(frames, self._failures[self._next_failure][0] - self.simulation.frame_index)
+        scripted = self._script is not None and self.simulation.mode == "mocm"
         by_code = self._hands is not None or self._nacelle_law is not None
-        if not by_code and (self._pilot is None or self.simulation.mode != "external"):
+        if not by_code and not scripted and (self._pilot is None or self.simulation.mode != "external"):
             rows = self.simulation.run(frames)
             self.rows += len(rows)
             return rows
@@ -173,6 +180,8 @@ class FlightSession:
             self._pilot = self._pilot_factory()
         if self._hands is not None:
             self._hands.reset(self.simulation)
+        if self._script is not None:
+            self._script.reset()
         if self._nacelle_law is not None:
             self._nacelle_law.reset()
 

@@ -94,11 +94,8 @@ def trial_problems(
                 )
             )
         if pulse.replaces and pulse.channel == "switch":
-            found.append(
-                InputError(
-                    "has no meaning for the switch", file=file, key=f"pulses[{number}].replaces", mend="delete it"
-                )
-            )
+            key = f"pulses[{number}].replaces"
+            found.append(InputError("has no meaning for the switch", file=file, key=key, mend="delete it"))
     if trial is None:
         return found
     if has_events:
@@ -130,9 +127,8 @@ def trial_problems(
         if clause.min is None and clause.max is None:
             found.append(InputError("has no limit", file=file, key=key, mend="add min, max or both"))
         elif clause.min is not None and clause.max is not None and clause.min > clause.max:
-            found.append(
-                InputError("is larger than max", file=file, key=f"{key}.min", value=clause.min, mend="swap them")
-            )
+            key = f"{key}.min"
+            found.append(InputError("is larger than max", file=file, key=key, value=clause.min, mend="swap them"))
     return found
 
 

@@ -33,6 +33,8 @@ COMMAND_MODULES = (
     "log",
     "check",
     "timing",
+    "test",
+    "campaign",
     "optimize",
     "reproduce",
     "joystick",

@@ -24,7 +24,7 @@ _REASON_COLUMN = {
     "lever": COLUMN.protection_lever_reason,
     "nacelle_rate": COLUMN.protection_nacelle_reason,
 }
-_REASON_NUMBER = {name: float(number + 1) for number, name in enumerate(LIMIT_KINDS)}
+_REASON_NUMBER: dict[str, float] = {name: float(number + 1) for number, name in enumerate(LIMIT_KINDS)}
 REASON_OTHER = float(len(LIMIT_KINDS) + 1)
 """Reason of an intervention for a limit that rtsim has no name for, or for none given."""
 
@@ -76,8 +76,8 @@ def sensors_object(values: FloatArray) -> Sensors:
     numbers = values.tolist()
     return Sensors(
         *numbers[: law_data.SENSE_DOWNSTOP],
-        on_downstop=numbers[law_data.SENSE_DOWNSTOP] != 0.0,
-        nacelle_ok=numbers[law_data.SENSE_NACELLE_OK] != 0.0,
+        numbers[law_data.SENSE_DOWNSTOP] != 0.0,
+        numbers[law_data.SENSE_NACELLE_OK] != 0.0,
     )
 
 

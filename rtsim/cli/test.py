@@ -1,0 +1,200 @@
+"""``rtsim test``: flies scenarios as tests and gives a verdict that CI can read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from rtsim.cli.output import console, emit_json, progress, results, whole_file
+from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError, RtsimError
+
+if TYPE_CHECKING:
+    from scenarios.scenario import PlantName, Scenario
+    from scenarios.verdict import Case
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the app.
+
+    Args:
+        app: The ``rtsim`` command.
+    """
+    app.command("test")(run_tests)
+
+
+def run_tests(
+    paths: Annotated[
+        list[str] | None,
+        typer.Argument(help="Scenario names, .toml files or folders of them.", show_default="the whole library"),
+    ] = None,
+    *,
+    protection: Annotated[
+        str | None, typer.Option(help="Law under test instead of each scenario's own: a name or MODULE:CLASS.")
+    ] = None,
+    plant: Annotated[
+        Literal["lpv", "lpv-plain", "nonlinear"] | None, typer.Option(help="Model to fly instead of each scenario's.")
+    ] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a report with pictures here.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for a replay bundle of every failure.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
+) -> None:
+    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails.
+
+    Args:
+        paths: Scenario names, files or folders; none tests the whole library.
+        protection: Law under test instead of each scenario's own.
+        plant: Model to fly instead of each scenario's own.
+        junit: Write JUnit XML here.
+        html: Write a report with pictures here.
+        out: Folder for a replay bundle of every failure.
+        json: Print one JSON object on stdout.
+
+    Raises:
+        InputError: A scenario or law does not exist, or nothing is to be tested.
+    """
+    for file in (junit, html):
+        _check_writable(file)
+    scenarios = _chosen(paths or [])
+    cases = _flown(scenarios, protection, plant)
+    if junit is not None:
+        _write_junit(cases, junit)
+    if html is not None:
+        from scenarios.verdict_report import html_report
+
+        with whole_file(html) as temporary:
+            temporary.write_text(html_report(cases), encoding="utf-8")
+    bundles = _bundles(cases, out)
+    failed = sum(case.verdict != "passed" for case in cases)
+    if json:
+        emit_json(
+            {
+                "scenarios": len(cases),
+                "passed": len(cases) - failed,
+                "failed": failed,
+                "cases": [case.summary() | {"bundle": bundles.get(case.name)} for case in cases],
+            }
+        )
+    else:
+        _print(cases)
+    if failed:
+        raise typer.Exit(EXIT_EXPECTATION_FAILED)
+
+
+def _chosen(paths: list[str]) -> list[Scenario]:
+    """Load what is to be tested, before anything is flown."""
+    from scenarios.loader import library_names, load_scenario
+    from scenarios.verdict import is_test
+
+    names: list[str | Path] = []
+    for path in paths:
+        folder = Path(path)
+        if folder.is_dir():
+            found = sorted(folder.glob("*.toml"))
+            if not found:
+                raise InputError("holds no scenario files", file=path, mend="name a folder with .toml files")
+            names += found
+        else:
+            names.append(path)
+    loaded = [load_scenario(name) for name in (names or library_names())]
+    tests = [scenario for scenario in loaded if is_test(scenario)]
+    if paths and len(tests) < len(loaded):
+        odd = next(scenario for scenario in loaded if not is_test(scenario))
+        raise InputError(
+            "says nothing that could be tested",
+            file=odd.file,
+            mend="add [[expect]] or [trial] (docs/testing-protection.md)",
+        )
+    return tests
+
+
+def _flown(scenarios: list[Scenario], protection: str | None, plant: PlantName | None) -> list[Case]:
+    from scenarios.verdict import Tester, broken_case
+
+    tester = Tester(law=protection, plant=plant)
+    cases = []
+    with progress("Testing", total=len(scenarios)) as advance:
+        for scenario in scenarios:
+            try:
+                cases.append(tester.run(scenario))
+            except RtsimError as error:
+                cases.append(broken_case(scenario, protection, str(error)))
+            advance(1)
+    return cases
+
+
+def _write_junit(cases: list[Case], path: Path) -> None:
+    from scenarios.verdict_junit import JunitCase, junit_xml
+
+    document = junit_xml(
+        "rtsim test",
+        [
+            JunitCase(
+                name=case.name,
+                suite=f"rtsim.test.{case.law}",
+                seconds=case.wall_s,
+                properties={
+                    "law": case.law,
+                    "kind": case.kind,
+                    "plant": case.scenario.plant,
+                    "seed": case.scenario.seed,
+                    **case.metrics,
+                    **{f"off.{name}": value for name, value in case.off_metrics.items()},
+                },
+                failures=[item.sentence for item in case.failures],
+                error=case.error,
+            )
+            for case in cases
+        ],
+    )
+    with whole_file(path) as temporary:
+        temporary.write_bytes(document)
+
+
+def _bundles(cases: list[Case], out: Path | None) -> dict[str, str]:
+    if out is None:
+        return {}
+    from scenarios.verdict_bundle import write_bundle
+
+    found = {}
+    for case in cases:
+        if case.verdict == "failed":
+            found[case.name] = str(write_bundle(case, out))
+            console.print(f"{case.name}: bundle in {found[case.name]}")
+    return found
+
+
+def _print(cases: list[Case]) -> None:
+    from rich.table import Table
+
+    table = Table()
+    for heading in ("scenario", "kind", "law", "verdict", "outside", "depth kn", "off depth kn", "what failed"):
+        table.add_column(heading, overflow="fold")
+    for case in cases:
+        words = case.error or "; ".join(item.sentence for item in case.failures)
+        table.add_row(
+            case.name,
+            case.kind,
+            case.law,
+            {"passed": "[green]passed[/]", "failed": "[red]FAILED[/]", "error": "[red]ERROR[/]"}[case.verdict],
+            *(
+                f"{values[key]:.{digits}f}" if key in values else ""
+                for values, key, digits in (
+                    (case.metrics, "exceedances", 0),
+                    (case.metrics, "depth_kt", 1),
+                    (case.off_metrics, "depth_kt", 1),
+                )
+            ),
+            words,
+        )
+    results.print(table)
+    failed = sum(case.verdict != "passed" for case in cases)
+    results.print(f"{len(cases) - failed} of {len(cases)} passed")
+
+
+def _check_writable(path: Path | None) -> None:
+    """A report that cannot be written is better known before the flights than after."""
+    if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
+        raise OutputError(f"{path}: cannot be written: its folder does not exist or it is one itself.")
