@@ -168,7 +168,7 @@ def summarize(flights: Flights, seed: int) -> dict[str, Any]:
                 "runs": len(metrics),
                 "laws": {
                     law.label: {
-                        event: asdict(rate(int(happened.sum()), len(happened), confidence=flights.spec.confidence))
+                        event: _rate(happened, flights)
                         for event in ("exceeded", "deep", "activated", "harmed")
                         for happened in (flights.happened(event, place, (item.name,)),)
                     }
@@ -182,12 +182,17 @@ def summarize(flights: Flights, seed: int) -> dict[str, Any]:
     }
 
 
+def _rate(happened: FloatArray, flights: Flights) -> dict[str, Any]:
+    found = rate(int(happened.sum()), len(happened), confidence=flights.spec.confidence)
+    return {"value": found.value, **asdict(found)}
+
+
 def _law_summary(flights: Flights, place: int, seed: int) -> dict[str, Any]:
     confidence = flights.spec.confidence
     events = {}
     for event in EVENTS:
         happened = flights.happened(event, place)
-        events[event] = asdict(rate(int(happened.sum()), len(happened), confidence=confidence))
+        events[event] = _rate(happened, flights)
     metrics = np.concatenate([values[:, place] for values in flights.metrics])
     off = np.concatenate([values[:, flights.off] for values in flights.metrics])
     outside = metrics[metrics[:, METRIC_PLACE["exceedances"]] > 0.0]
@@ -240,6 +245,6 @@ def _characteristic(flights: Flights) -> list[dict[str, Any]]:
         point: dict[str, Any] = {"law": law.label, "buffer_kt": law.buffer_kt}
         for key, event, classes in (("nuisance", "nuisance", nominal), ("exceeded", "exceeded", other)):
             happened = flights.happened(event, place, classes) if classes else np.zeros(0)
-            point[key] = asdict(rate(int(happened.sum()), len(happened), confidence=flights.spec.confidence))
+            point[key] = _rate(happened, flights)
         found.append(point)
     return found if len(found) > 1 else []
