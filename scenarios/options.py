@@ -6,6 +6,7 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+from rtsim.atmosphere.specification import Severity, Turbulence
 from rtsim.errors import InputError
 from rtsim.programme import AIRSPEED_RANGE, ALTITUDE_RANGE, NACELLE_RANGE, Programme, ProgrammePoint
 from rtsim.units import kt, to_deg, to_kt
@@ -39,6 +40,8 @@ class Overrides:
     rate_hz: int | None = None
     seed: int | None = None
     wind: float | None = None
+    turbulence: Severity | None = None
+    """Dryden turbulence in place of the scenario's; its gusts stay."""
     pilot_noise: bool | None = None
     duration: float | None = None
     start: str | None = None
@@ -71,22 +74,6 @@ def chosen_scenario(name_or_path: str | None, overrides: Overrides) -> Scenario:
     return with_overrides(load_scenario(DEFAULT_SCENARIO if name_or_path is None else name_or_path), overrides)
 
 
-def refuse_unavailable(scenario: Scenario) -> None:
-    """Refuse what the scenario format knows and this version cannot do.
-
-    Args:
-        scenario: What is to be flown.
-    """
-    if scenario.protection not in {"off", "monitor"}:
-        raise InputError(
-            "this version watches the corridor but does not protect it yet",
-            key="--protection",
-            value=scenario.protection,
-            allowed="off, monitor",
-            mend="fly with --protection monitor",
-        )
-
-
 def with_overrides(scenario: Scenario, overrides: Overrides) -> Scenario:
     """Change a scenario.
 
@@ -110,6 +97,9 @@ def _with_options(scenario: Scenario, overrides: Overrides) -> Scenario:
     changed = dataclasses.replace(scenario, **plain)
     if overrides.nacelle is not None:
         changed = dataclasses.replace(changed, nacelle=overrides.nacelle)
+    if overrides.turbulence is not None:
+        turbulence = Turbulence.of_severity(overrides.turbulence)
+        changed = dataclasses.replace(changed, air=dataclasses.replace(changed.air, turbulence=turbulence))
     _check_range("--rate", changed.rate_hz, RATE_RANGE, "Hz")
     _check_range("--wind-kt", changed.wind, WIND_RANGE, "kn", unit=kt(1.0))
     _check_range("--seed", changed.seed, (0, 2**63 - 1), "")

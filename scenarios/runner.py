@@ -28,7 +28,7 @@ from scenarios.loader import load_scenario
 from scenarios.mavlink_options import MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
 from scenarios.metrics import flight_metrics
 from scenarios.nacelle_laws import automatic_nacelle, load_nacelle_law
-from scenarios.options import Overrides, refuse_unavailable, with_overrides
+from scenarios.options import Overrides, with_overrides
 from scenarios.pilots import load_pilot
 from scenarios.record import FlightRecord, judge
 from scenarios.scenario import Scenario
@@ -100,7 +100,6 @@ def fly(
         scenario = load_scenario(scenario)
     if overrides is not None:
         scenario = with_overrides(scenario, overrides)
-    refuse_unavailable(scenario)
     policy = OverrunPolicy.parse(overrun_policy)
     outputs = outputs if outputs is not None else FlightOutputs()
     pilot_factory = load_pilot(scenario.pilot)
@@ -191,6 +190,8 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         air=scenario.air,
         faults=scenario.faults,
         automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),
+        protection=scenario.protection,
+        protection_boundary=scenario.corridor_name,
     )
 
 

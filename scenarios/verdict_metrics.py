@@ -62,7 +62,7 @@ TORQUE_EXCESS = 1.02
 class TrialMetrics(Mapping[str, float]):
     """The numbers of one trial flight, by name."""
 
-    values: FloatArray
+    values: FloatArray  # type: ignore[assignment]  # the array, where a mapping has a view of its values
     """In the order of ``TRIAL_METRICS``."""
 
     def __getitem__(self, name: str) -> float:

@@ -63,6 +63,9 @@ def fly_command(
     nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle at the start [deg], 90 helicopter.")] = None,
     altitude_m: Annotated[float | None, typer.Option(help="Altitude at the start [m].")] = None,
     wind_kt: Annotated[float | None, typer.Option(help="Steady tailwind [kn].")] = None,
+    turbulence: Annotated[
+        Literal["none", "light", "moderate", "severe"] | None, typer.Option(help="Dryden turbulence (MIL-F-8785C).")
+    ] = None,
     pilot_noise: Annotated[bool | None, typer.Option(help="Let the MOCM's noise act.")] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Open no viewer.")] = False,
     record: Annotated[Path | None, typer.Option(help="Write the Rerun view into FILE.rrd.")] = None,
@@ -108,6 +111,7 @@ def fly_command(
         nacelle_deg: Nacelle angle at the start [deg].
         altitude_m: Altitude at the start [m].
         wind_kt: Steady tailwind [kn].
+        turbulence: Severity of the turbulence.
         pilot_noise: Whether the MOCM's noise acts.
         headless: Open no viewer.
         record: Rerun recording to write.
@@ -132,7 +136,7 @@ def fly_command(
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
     from scenarios.nacelle_laws import load_nacelle_law
-    from scenarios.options import Overrides, chosen_scenario, refuse_unavailable
+    from scenarios.options import Overrides, chosen_scenario
     from scenarios.pilots import HAND_PILOT, load_pilot
 
     OverrunPolicy.parse(overrun_policy)
@@ -146,6 +150,7 @@ def fly_command(
         rate_hz=rate,
         seed=seed,
         wind=None if wind_kt is None else kt(wind_kt),
+        turbulence=turbulence,
         pilot_noise=pilot_noise,
         duration=duration,
         start=start,
@@ -155,7 +160,6 @@ def fly_command(
     )
     pace = parse_speed(speed)
     chosen = chosen_scenario(scenario, overrides)
-    refuse_unavailable(chosen)
     load_pilot(chosen.pilot)
     load_nacelle_law(chosen.nacelle)
     link = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +26,7 @@ _REASON_COLUMN = {
     "nacelle_rate": COLUMN.protection_nacelle_reason,
 }
 _REASON_NUMBER: dict[str, float] = {name: float(number + 1) for number, name in enumerate(LIMIT_KINDS)}
+_SENSOR_NAMES = tuple(item.name for item in fields(Sensors))[: law_data.SENSE_DOWNSTOP]
 REASON_OTHER = float(len(LIMIT_KINDS) + 1)
 """Reason of an intervention for a limit that rtsim has no name for, or for none given."""
 
@@ -75,9 +77,9 @@ def sensors_object(values: FloatArray) -> Sensors:
     """
     numbers = values.tolist()
     return Sensors(
-        *numbers[: law_data.SENSE_DOWNSTOP],
-        numbers[law_data.SENSE_DOWNSTOP] != 0.0,
-        numbers[law_data.SENSE_NACELLE_OK] != 0.0,
+        **dict(zip(_SENSOR_NAMES, numbers, strict=False)),
+        on_downstop=numbers[law_data.SENSE_DOWNSTOP] != 0.0,
+        nacelle_ok=numbers[law_data.SENSE_NACELLE_OK] != 0.0,
     )
 
 

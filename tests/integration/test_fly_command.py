@@ -99,7 +99,6 @@ def test_a_failed_expectation_is_exit_1(tmp_path: Path, capsys: pytest.CaptureFi
         (["hovr"], "perhaps 'hover' is meant"),
         (["none.toml"], "does not exist"),
         (["--pilot", "mavlink", "--speed", "max"], "MAVLink needs a paced flight"),
-        (["--protection", "governor"], "off, monitor"),
         (["--protection", "much"], "--protection"),
         (["--mavlink", "192.0.2.1:14550"], "--mavlink-network"),
         (["--speed", "fast"], "0.001 to 1000"),
