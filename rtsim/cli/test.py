@@ -170,26 +170,21 @@ def _print(cases: list[Case]) -> None:
     from rich.table import Table
 
     table = Table()
-    for heading in ("scenario", "kind", "law", "verdict", "outside", "depth kn", "off depth kn", "what failed"):
-        table.add_column(heading, overflow="fold")
+    for heading in ("scenario", "kind", "law", "verdict", "deepest kn", "off kn"):
+        table.add_column(heading, overflow="fold", no_wrap=heading in {"scenario", "kind"})
     for case in cases:
-        words = case.error or "; ".join(item.sentence for item in case.failures)
         table.add_row(
             case.name,
             case.kind,
             case.law,
             {"passed": "[green]passed[/]", "failed": "[red]FAILED[/]", "error": "[red]ERROR[/]"}[case.verdict],
-            *(
-                f"{values[key]:.{digits}f}" if key in values else ""
-                for values, key, digits in (
-                    (case.metrics, "exceedances", 0),
-                    (case.metrics, "depth_kt", 1),
-                    (case.off_metrics, "depth_kt", 1),
-                )
-            ),
-            words,
+            *(f"{values['depth_kt']:.1f}" if values else "" for values in (case.metrics, case.off_metrics)),
         )
     results.print(table)
+    for case in cases:
+        words = [case.error] if case.error else [f"{item.name}: {item.sentence}" for item in case.failures]
+        for word in words:
+            results.print(f"{case.name}: {word}", markup=False)
     failed = sum(case.verdict != "passed" for case in cases)
     results.print(f"{len(cases) - failed} of {len(cases)} passed")
 
