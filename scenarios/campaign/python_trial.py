@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ REASON_OTHER = float(len(LIMIT_KINDS) + 1)
 """Reason of an intervention for a limit that rtsim has no name for, or for none given."""
 
 
-def fly_in_python(flying: Flying, laws: LawChain | None, pilot: Pilot | None) -> int:
+def fly_in_python(flying: Flying, laws: LawChain | None, pilot: Pilot | None) -> tuple[int, int]:
     """Fly until the rows are full or the flight ends.
 
     Args:
@@ -40,15 +41,16 @@ def fly_in_python(flying: Flying, laws: LawChain | None, pilot: Pilot | None) ->
         pilot: A pilot written in Python; None: the built-in one.
 
     Returns:
-        Frames flown.
+        Frames flown, and decisions that took the laws longer than the time between two of them.
     """
     tables, state, scratch = flying.tables, flying.state, flying.scratch
     script = (flying.pulses, flying.script_state)
     asked_of_pilot = script if pilot is None else (flying.pulses[:0], flying.script_state)
     command, sensors = scratch.asked, np.zeros(law_data.SENSOR_COUNT)
+    slow = 0
     for k in range(len(flying.rows)):
         if state.clock[simulation.CLOCK_END] != simulation.END_NONE:
-            return k
+            return k, slow
         row = flying.rows[k]
         kernels.ask_pilot(tables, state, scratch, row, asked_of_pilot, command)
         if pilot is not None:
@@ -63,10 +65,12 @@ def fly_in_python(flying: Flying, laws: LawChain | None, pilot: Pilot | None) ->
             simulation.shape(tables, state, scratch, command)
             if laws.due(k):
                 simulation.sense(state, scratch, row, sensors)
+            began = time.perf_counter()
             _ask_laws(laws, k, sensors, scratch, row)
+            slow += time.perf_counter() - began > laws.period
             simulation.complete(tables, state, scratch, row, (command, *noise))
         kernels.take_notice(tables, state, scratch, row, script, flying.reaction)
-    return len(flying.rows)
+    return len(flying.rows), slow
 
 
 def sensors_object(values: FloatArray) -> Sensors:
@@ -107,12 +111,12 @@ NO_PREDICTION = 6.0
 
 
 def _reference(flying: Flying, scratch: simulation.Scratch) -> Reference:
-    time = float(flying.state.clock[simulation.CLOCK_FRAME]) * flying.tables.dt
+    now = float(flying.state.clock[simulation.CLOCK_FRAME]) * flying.tables.dt
     target = scratch.target.tolist()
     return Reference(
         airspeed=target[0],
         airspeed_rate=target[1],
-        nacelle_angle=flying.programme.at(time).nacelle_angle,
+        nacelle_angle=flying.programme.at(now).nacelle_angle,
         nacelle_rate=target[4],
         altitude=target[2],
     )

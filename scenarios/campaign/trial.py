@@ -37,6 +37,10 @@ if TYPE_CHECKING:
     from rtsim.command import Pilot
 
 
+SLOW_CALLS = 10
+"""Calls of a law in one flight that last longer than its period and count as a failure; fewer are the machine's."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightPlan:
     """One flight as it is meant to go, without a law. SI and radians."""
@@ -170,14 +174,20 @@ class Bench:
         flying = self._prepare(plan, tables, external=pilot is not None)
         problems: tuple[str, ...] = ()
         if name is not None:
-            flown = self._fly_compiled(flying) if pilot is None else fly_in_python(flying, None, pilot)
+            flown = self._fly_compiled(flying) if pilot is None else fly_in_python(flying, None, pilot)[0]
         else:
             assert not isinstance(law, str)  # a name is a compiled law
             chain = LawChain(law, dt=self.dt, remember=repeat)
-            flown = fly_in_python(flying, chain, pilot)
+            flown, slow = fly_in_python(flying, chain, pilot)
             if repeat:
                 chain.unrepeatable()
             problems = tuple(event.text for event in chain.events)
+            if slow >= SLOW_CALLS:
+                names = ", ".join(spec.name for spec in law)
+                problems += (
+                    f"the law {names} took longer than its period of {1000.0 * chain.period:.0f} ms in {slow} calls; "
+                    "in real time it would be late and skipped",
+                )
         metrics = np.zeros(kernels.METRIC_COUNT)
         rows = flying.rows[:flown]
         kernels.measure_trial(rows, flying.tables.programme, self._limits, self.dt, metrics)

@@ -1,0 +1,156 @@
+"""``rtsim test`` as CI runs it: exit codes, JSON, JUnit XML, report, replay bundles, and laws that break."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+
+import pytest
+
+TRIAL = """
+format = 1
+name = "mine"
+title = "A forward switch at 60 kn"
+duration_s = 15
+[start]
+airspeed_kt = 60
+nacelle_deg = 82
+altitude_m = 300
+[programme]
+points = [{ airspeed_kt = 60, nacelle_deg = 82, hold_s = 15 }]
+[[pulses]]
+channel = "switch"
+time_s = 2
+duration_s = 6
+amount = -7.5
+[trial]
+kind = "misuse"
+off_leaves = ["corridor"]
+[[trial.expect]]
+name = "the corridor is kept"
+metric = "exceedances"
+max = 0
+"""
+LAWS = """
+import time
+
+class Good:
+    def step(self, sensors, command, margins, dt):
+        return command, []
+
+class Raises(Good):
+    def step(self, sensors, command, margins, dt):
+        raise ValueError("no such thing")
+
+class NotANumber(Good):
+    def step(self, sensors, command, margins, dt):
+        return type(command)(float("nan"), command.lever, command.nacelle_rate), []
+
+class Sleeps(Good):
+    def step(self, sensors, command, margins, dt):
+        if 1.0 < sensors.time < 1.3:
+            time.sleep(0.05)
+        return command, []
+
+CALLS = []
+
+class Global(Good):
+    def step(self, sensors, command, margins, dt):
+        CALLS.append(1)
+        return type(command)(command.stick + 1e-6 * len(CALLS), command.lever, command.nacelle_rate), []
+"""
+
+
+def run(folder, *arguments):
+    command = [sys.executable, "-m", "rtsim", "test", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=folder)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "mine.toml").write_text(TRIAL, encoding="utf-8")
+    (tmp_path / "mylaws.py").write_text(LAWS, encoding="utf-8")
+    return tmp_path
+
+
+def test_a_first_hour_scenario_law_and_junit(folder):
+    passed = run(folder, "mine.toml", "--junit", "j.xml", "--html", "r.html", "--json")
+    assert passed.returncode == 0, passed.stderr
+    answer = json.loads(passed.stdout.splitlines()[-1])
+    assert (answer["passed"], answer["failed"]) == (1, 0)
+    assert answer["cases"][0]["off_metrics"]["exceedances"] > 0
+    suite = ET.parse(folder / "j.xml").getroot().find("testsuite")
+    assert suite.attrib["tests"] == "1"
+    properties = {item.get("name"): item.get("value") for item in suite.iter("property")}
+    assert float(properties["off.depth_kt"]) > 5.0
+    assert properties["law"] == "full"
+    page = (folder / "r.html").read_text(encoding="utf-8")
+    assert "data:image/svg+xml;base64," in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_a_failure_is_told_and_can_be_replayed(folder):
+    failed = run(folder, "mine.toml", "--protection", "off", "--junit", "j.xml", "--out", "bundles", "--json")
+    assert failed.returncode == 1
+    failure = ET.parse(folder / "j.xml").getroot().find(".//failure")
+    assert "exceedances=1 want <= 0" in failure.get("message")
+    bundle = folder / "bundles" / "mine"
+    verdict = json.loads((bundle / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["logs"]["law"]["same_as_judged"]
+    assert (bundle / "scenario.toml").read_text(encoding="utf-8") == TRIAL
+    replay = subprocess.run(
+        [sys.executable, "-m", "rtsim", "replay", "law.parquet"],
+        cwd=bundle, capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    assert replay.returncode == 0, replay.stdout + replay.stderr
+    assert verdict["history_sha256"] in replay.stdout
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("Raises", "no such thing"),
+        ("NotANumber", "not finite"),
+        ("Sleeps", "took longer than its period"),
+        ("Global", "keeps state outside"),
+    ],
+)
+def test_a_law_that_breaks_is_named(folder, law, words):
+    ended = run(folder, "mine.toml", "--protection", f"mylaws:{law}", "--json")
+    assert ended.returncode == 1, ended.stderr
+    case = json.loads(ended.stdout.splitlines()[-1])["cases"][0]
+    said = next(text for text in case["failures"] if text.startswith("law="))
+    assert words in said, said
+    assert law in said
+
+
+def test_a_law_of_ones_own_that_runs_is_not_blamed(folder):
+    ended = run(folder, "mine.toml", "--protection", "mylaws:Good", "--json")
+    failures = json.loads(ended.stdout.splitlines()[-1])["cases"][0]["failures"]
+    assert failures == ["exceedances=1 want <= 0"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("off_leaves", "of_leaves", "of_leaves"),
+        ('metric = "exceedances"', 'metric = "exceedance"', "exceedances"),
+        ("max = 0", "", "has no limit"),
+        ('off_leaves = ["corridor"]', "", "off_leaves"),
+        ("amount = -7.5", "amount = -75", "amount"),
+    ],
+)
+def test_mistakes_name_the_key(folder, old, new, words):
+    (folder / "mine.toml").write_text(TRIAL.replace(old, new), encoding="utf-8")
+    ended = run(folder, "mine.toml")
+    assert ended.returncode == 2
+    assert words in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_other_mistakes_have_their_exit_codes(folder):
+    assert run(folder, "mine.toml", "--protection", "fulll").returncode == 2
+    assert run(folder, "manual_flight").returncode in {0, 2}
+    assert run(folder, "mine.toml", "--junit", "nowhere/j.xml").returncode == 4
