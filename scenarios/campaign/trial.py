@@ -184,10 +184,9 @@ class Bench:
             problems = tuple(event.text for event in chain.events)
             if slow >= SLOW_CALLS:
                 names = ", ".join(spec.name for spec in law)
-                problems += (
-                    f"the law {names} took longer than its period of {1000.0 * chain.period:.0f} ms in {slow} calls; "
-                    "in real time it would be late and skipped",
-                )
+                period = 1000.0 * chain.period
+                late = f"took longer than its period of {period:.0f} ms in {slow} calls; in real time it would be late"
+                problems += (f"the law {names} {late}",)
         metrics = np.zeros(kernels.METRIC_COUNT)
         rows = flying.rows[:flown]
         kernels.measure_trial(rows, flying.tables.programme, self._limits, self.dt, metrics)
