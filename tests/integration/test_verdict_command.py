@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+import textwrap
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import pytest
 
@@ -89,6 +92,18 @@ def test_a_first_hour_scenario_law_and_junit(folder):
     page = (folder / "r.html").read_text(encoding="utf-8")
     assert "data:image/svg+xml;base64," in page
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_the_first_hour_of_the_documentation_passes(tmp_path):
+    page = (Path(__file__).resolve().parents[2] / "docs" / "testing-protection.md").read_text(encoding="utf-8")
+    blocks = dict(reversed(re.findall(r"^   ```(python|toml)\n(.*?)^   ```", page, flags=re.DOTALL | re.MULTILINE)))
+    (tmp_path / "mylaws.py").write_text(textwrap.dedent(blocks["python"]), encoding="utf-8")
+    (tmp_path / "mine.toml").write_text(textwrap.dedent(blocks["toml"]), encoding="utf-8")
+    command = re.search(r"`rtsim test (mine.toml .*?)`", page).group(1).split()
+    ended = run(tmp_path, *command)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert ET.parse(tmp_path / "results.xml").getroot().attrib["failures"] == "0"
+    assert (tmp_path / "report.html").stat().st_size > 10_000
 
 
 def test_a_failure_is_told_and_can_be_replayed(folder):
