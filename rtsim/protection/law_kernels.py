@@ -173,9 +173,9 @@ def law_decide(
     state[L_MARGIN] = min(out[model.OUT_LOW], out[model.OUT_HIGH])
     law_release_unblended(state)
     if tables.law == LAW_GOVERNOR:
-        govern(tables, state, cell, z, asked, nacelle, command[2], out)
+        govern(tables, state, cell, z, (asked, asked), nacelle, command[2], out)
     elif tables.law == LAW_FULL:
-        govern(tables, state, cell, z, acting, nacelle, command[2], out)
+        govern(tables, state, cell, z, (acting, asked), nacelle, command[2], out)
         flight = (airspeed, angle, climb)
         scratch = (cell, target, out)
         blend_recovery(tables, state, scratch, z, asked, nacelle, command[2], flight, sensors[SENSE_ALTITUDE])

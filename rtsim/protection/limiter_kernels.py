@@ -95,7 +95,7 @@ def govern(
     state: FloatArray,
     cell: FloatArray,
     z: tuple[float, float, float, float],
-    controls: tuple[float, float],
+    controls: tuple[tuple[float, float], tuple[float, float]],
     nacelle: tuple[float, float, float],
     pilot_rate: float,
     out: FloatArray,
@@ -107,7 +107,7 @@ def govern(
         state: Law state; its nacelle bounds are set.
         cell: The model here.
         z: u, w, q, pitch.
-        controls: Stick and lever taken to be held.
+        controls: Stick and lever that will act if the nacelles stop, and those that the pilot asks for.
         nacelle: Command angle, angle, rate [rad, rad, rad/s].
         pilot_rate: Nacelle rate asked for [rad/s].
         out: Scratch of ROLL_OUT_SIZE numbers.
@@ -116,66 +116,102 @@ def govern(
     bias = (state[L_BIAS], settings.bias_decay)
     time = (settings.step, settings.horizon)
     guard = (settings.pitch, settings.pitch_frequency)
+    acting, asked = controls
     state[L_RATE_LOW], state[L_RATE_HIGH] = -FREE, FREE
     state[L_KIND] = 0.0
-    roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, (0.0, 0.0), bias, time, guard, out)
+    roll_out(tables.model, tables.corridor, cell, z, acting, nacelle, (0.0, 0.0), bias, time, guard, out)
     stopped = min(out[model.OUT_LOW], out[model.OUT_HIGH])
     state[L_MARGIN] = stopped
-    stopped_low, stopped_high = out[model.OUT_LOW], out[model.OUT_HIGH]
-    ends = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
-    angle = nacelle[1]
-    gated = angle <= tables.corridor.downstop_nacelle
     if stopped < settings.reverse_margin:
-        low_side = stopped_low < stopped_high
-        state[L_RATE_REASON] = REASON_LOW if low_side else REASON_HIGH
-        state[L_KIND] = 1.0
-        if not low_side and settings.finish_nacelle < angle <= settings.flat_high_nacelle:
-            state[L_RATE_HIGH] = 0.0
-            state[L_KIND] = 0.0
-            return
-        back = settings.reverse_rate if low_side else -settings.reverse_rate
-        if not low_side and angle <= settings.finish_nacelle:
-            state[L_RATE_HIGH] = back
-            return
-        roll_out(
-            tables.model, tables.corridor, cell, z, controls, nacelle, (back, settings.horizon), bias, time, guard, out
-        )
-        turned = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
-        # Aft is the way out on the low side and forward on the high side even where the nacelles' own pull or drag
-        # costs margin at first: only a turn that is seen to suffice may be slower than the fastest.
-        share = 1.0
-        if turned > settings.reverse_margin:
-            share = clip((settings.reverse_margin - ends) / (turned - ends), 0.25, 1.0)
-        if low_side:
-            state[L_RATE_LOW] = share * back
-        else:
-            state[L_RATE_HIGH] = share * back
+        low_side = out[model.OUT_LOW] < out[model.OUT_HIGH]
+        ends = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
+        _turn_back(tables, state, cell, z, acting, nacelle, (low_side, ends), out)
+    elif pilot_rate != 0.0:
+        if asked != acting:
+            roll_out(tables.model, tables.corridor, cell, z, asked, nacelle, (0.0, 0.0), bias, time, guard, out)
+            stopped = min(out[model.OUT_LOW], out[model.OUT_HIGH])
+        _scale_rate(tables, state, cell, z, asked, nacelle, (pilot_rate, stopped), out)
+
+
+@inner_kernel
+def _turn_back(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    z: tuple[float, float, float, float],
+    controls: tuple[float, float],
+    nacelle: tuple[float, float, float],
+    stopped: tuple[bool, float],
+    out: FloatArray,
+) -> None:
+    """Bound the nacelle rate so that the nacelles turn away from the side that stopping would cross."""
+    settings = tables.settings
+    low_side, ends = stopped
+    angle = nacelle[1]
+    state[L_RATE_REASON] = REASON_LOW if low_side else REASON_HIGH
+    if not low_side and settings.finish_nacelle < angle <= settings.flat_high_nacelle:
+        state[L_RATE_HIGH] = 0.0
         return
-    if pilot_rate == 0.0:
+    state[L_KIND] = 1.0
+    back = settings.reverse_rate if low_side else -settings.reverse_rate
+    if not low_side and angle <= settings.finish_nacelle:
+        state[L_RATE_HIGH] = back
         return
-    trial = 1.0
-    roll_out(
-        tables.model, tables.corridor, cell, z, controls, nacelle, (pilot_rate, settings.apply), bias, time, guard, out
-    )
+    bias = (state[L_BIAS], settings.bias_decay)
+    time = (settings.step, settings.horizon)
+    guard = (settings.pitch, settings.pitch_frequency)
+    turning = (back, settings.horizon)
+    roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, turning, bias, time, guard, out)
+    turned = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
+    # Aft is the way out on the low side and forward on the high side even where the nacelles' own pull or drag costs
+    # margin at first: only a turn that is seen to suffice may be slower than the fastest.
+    share = 1.0
+    if turned > settings.reverse_margin and turned > ends:
+        share = clip((settings.reverse_margin - ends) / (turned - ends), 0.25, 1.0)
+    if low_side:
+        state[L_RATE_LOW] = share * back
+    else:
+        state[L_RATE_HIGH] = share * back
+
+
+@inner_kernel
+def _scale_rate(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    z: tuple[float, float, float, float],
+    controls: tuple[float, float],
+    nacelle: tuple[float, float, float],
+    asked: tuple[float, float],
+    out: FloatArray,
+) -> None:
+    """Bound the nacelle rate to the part of what is asked for after which stopping still keeps the margin."""
+    settings = tables.settings
+    rate, stopped = asked
+    bias = (state[L_BIAS], settings.bias_decay)
+    time = (settings.step, settings.horizon)
+    guard = (settings.pitch, settings.pitch_frequency)
+    tried = (rate, settings.apply)
+    roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, tried, bias, time, guard, out)
     margin = min(out[model.OUT_LOW], out[model.OUT_HIGH])
     low_side = out[model.OUT_LOW] < out[model.OUT_HIGH]
     if margin >= settings.pass_margin or margin >= stopped:
         return
-    if stopped <= settings.pass_margin:
-        trial = 0.0
-    else:
+    share = 0.0
+    if stopped > settings.pass_margin:
         # The margin falls about linearly with the rate; what the secant allows is tried once more.
-        trial = (stopped - settings.pass_margin) / (stopped - margin)
-        tried = (trial * pilot_rate, settings.apply)
+        share = (stopped - settings.pass_margin) / (stopped - margin)
+        tried = (share * rate, settings.apply)
         roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, tried, bias, time, guard, out)
         if min(out[model.OUT_LOW], out[model.OUT_HIGH]) < settings.pass_margin:
-            trial *= 0.5
-    if gated and not low_side:
-        trial = 0.0
-    if pilot_rate < 0.0:
-        state[L_RATE_LOW] = trial * pilot_rate
+            share *= 0.5
+    gated = nacelle[1] <= tables.corridor.downstop_nacelle and not low_side
+    if gated:
+        share = 0.0
+    if rate < 0.0:
+        state[L_RATE_LOW] = share * rate
     else:
-        state[L_RATE_HIGH] = trial * pilot_rate
+        state[L_RATE_HIGH] = share * rate
     state[L_RATE_REASON] = REASON_LOW if low_side else (REASON_GATE if gated else REASON_HIGH)
 
 
@@ -251,7 +287,7 @@ def blend_recovery(
     bias = (state[L_BIAS], settings.bias_decay)
     allowed = clip(pilot_rate, state[L_RATE_LOW], state[L_RATE_HIGH])
     roll_out(
-        tables.model, tables.corridor, cell, z, asked, nacelle, (allowed, 0.5 * settings.horizon), bias,
+        tables.model, tables.corridor, cell, z, asked, nacelle, (allowed, settings.apply), bias,
         (settings.step, settings.horizon), (settings.pitch, settings.pitch_frequency), out,
     )  # fmt: skip
     low, high = out[model.OUT_LOW], out[model.OUT_HIGH]
