@@ -12,7 +12,7 @@ from rtsim.programme import AIRSPEED_RANGE, ALTITUDE_RANGE, NACELLE_RANGE, Progr
 from rtsim.units import kt, to_deg, to_kt
 from scenarios.loader import load_scenario, named_start
 from scenarios.pilots import HAND_PILOT
-from scenarios.scenario import DEFAULT_ALTITUDE, CorridorName, OuterLoop, PlantName, Protection, Scenario
+from scenarios.scenario import DEFAULT_ALTITUDE, CorridorName, OuterLoop, PlantName, Scenario
 
 DEFAULT_SCENARIO = "typical_conversion"
 """What ``rtsim fly`` flies when nothing is named."""
@@ -33,7 +33,7 @@ class Overrides:
     plant: PlantName | None = None
     outer_loop: OuterLoop | None = None
     pilot: str | None = None
-    protection: Protection | None = None
+    protection: str | None = None
     nacelle: str | None = None
     """Who sets the nacelle rate: ``programme``, ``automatic`` or MODULE:CLASS."""
     corridor: CorridorName | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from rtsim.errors import OutputError
@@ -53,6 +53,8 @@ class FlightRecord(Mapping[str, FloatArray]):
     """The scenario's expectations, judged."""
     database_hash: str
     """Hash of the LPV database that was flown."""
+    watched: Mapping[str, Any] = field(default_factory=dict)
+    """Least margins to every limit (``limits``) and what protection did (``interventions``); empty where unwatched."""
     mavlink: Mapping[str, Any] | None = None
     """What passed by MAVLink: port, age of the sticks, counts; None where there was none."""
     failure: OutputError | None = None
@@ -115,6 +117,7 @@ class FlightRecord(Mapping[str, FloatArray]):
             "database_sha256": self.database_hash,
         }
         result.update(asdict(self.metrics) if self.metrics is not None else {})
+        result.update(self.watched)
         if self.mavlink is not None:
             result["mavlink"] = dict(self.mavlink)
         result["expectations"] = [asdict(verdict) for verdict in self.verdicts]

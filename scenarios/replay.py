@@ -19,6 +19,9 @@ from scenarios.runner import setup_from_json, versions
 from telemetry.log_format import LogEvent
 from telemetry.log_reader import FlightLog, read_log
 
+ACTING_KINDS = frozenset({"reset", "pilot", "aid", "law", "override", *DISTURBANCE_KINDS})
+"""Kinds of the events that change a flight; a replay does them again."""
+
 
 @dataclass(frozen=True, slots=True)
 class Difference:
@@ -99,7 +102,9 @@ def fly_recording(simulation: Simulation, recorded: FloatArray, events: Sequence
     Returns:
         The replayed history, shape (rows flown, SIGNAL_COUNT).
     """
-    acting = [event for event in events if event.kind in {"reset", "pilot", "aid", *DISTURBANCE_KINDS}]
+    acting = [
+        event for event in events if event.kind in {"reset", "pilot", "aid", "law", "override", *DISTURBANCE_KINDS}
+    ]
     replayed = np.empty_like(recorded)
     due = 0
     for row in range(len(recorded)):
@@ -155,6 +160,14 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
         for aid in AIDS:
             if aid == event.data["aid"]:
                 simulation.set_aid(aid, bool(event.data["on"]))
+        return
+    if event.kind == "override":
+        simulation.set_protection_override(bool(event.data["on"]))
+        return
+    if event.kind == "law":
+        if simulation.laws is not None:
+            change = simulation.laws.end if event.data["ended"] else simulation.laws.skip
+            change(str(event.data["law"]))
         return
     if event.kind in DISTURBANCE_KINDS:
         simulation.disturb(disturbance_from_event(event.kind, event.data))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import platform
 import sys
@@ -24,6 +25,7 @@ from rtsim.realtime.report import TimingReport
 from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import to_deg, to_kt
 from scenarios.hands import Hands
+from scenarios.limit_watch import LimitWatch
 from scenarios.loader import load_scenario
 from scenarios.mavlink_options import MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
 from scenarios.metrics import flight_metrics
@@ -131,11 +133,14 @@ def fly(
             view=view,
             mirror=link,
             watch_corridor=scenario.protection != "off",
+            limits=_limit_watch(scenario, simulation.dt),
             on_rows=outputs.on_rows,
             on_event=_event_listener(outputs, link),
         )
         session.on_event = sinks.event
         simulation.warm_up()
+        if simulation.laws is not None:
+            simulation.laws.live, simulation.laws.on_event = live, session.law_event
         if view is not None and live:
             view.wait_ready(VIEW_PATIENCE_S)
         if link is not None:
@@ -350,6 +355,7 @@ def _measure(
     rows = sinks.history.rows()
     metrics = flight_metrics(rows, scenario.programme, session.dt) if len(rows) else None
     completed = session.completed and timing.ending == "finished"
+    watched = sinks.watched()
     last = int(rows[-1, 0]) + 1 if len(rows) else 0
     sinks.event(LogEvent(last, last * session.dt, "end", timing.end_reason, "info" if completed else "warning"))
     return FlightRecord(
@@ -366,7 +372,15 @@ def _measure(
         if timing.ending == "stopped"
         else judge(scenario, metrics, completed=completed, end_reason=timing.end_reason),
         database_hash=database_hash,
+        watched=watched,
     )
+
+
+def _limit_watch(scenario: Scenario, dt: float) -> Callable[[Callable[[LogEvent], None]], LimitWatch] | None:
+    """What watches the flight's limits; nothing with the protection off."""
+    if scenario.protection == "off":
+        return None
+    return functools.partial(LimitWatch, scenario.corridor_name, dt=dt)
 
 
 def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | None) -> OutputError | None:

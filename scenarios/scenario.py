@@ -16,7 +16,8 @@ from scenarios.verdict_trial import Trial
 PlantName = Literal["lpv", "lpv-plain", "nonlinear"]
 OuterLoop = Literal["integrators", "pi"]
 CorridorName = Literal["design", "flight"]
-Protection = Literal["off", "monitor", "governor", "full"]
+PASSIVE_LAWS = frozenset({"off", "monitor"})
+"""Protection that changes no command."""
 PilotMode = Literal["mocm", "external", "hold"]
 AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
 """The pilot aids of ``rtsim.aids``, named here so that reading a file loads no compiled code."""
@@ -94,7 +95,8 @@ class Scenario:
     """``mocm``, an entry point's name, or ``MODULE:CLASS``."""
     corridor: CorridorName | None
     """Boundaries to watch; None chooses by the protection."""
-    protection: Protection
+    protection: str
+    """Protection laws by name, in the order in which they act, separated by commas."""
     rate_hz: int
     seed: int
     wind: float
@@ -127,4 +129,4 @@ class Scenario:
         """The corridor in force: ``flight`` with a protection that acts, else ``design``."""
         if self.corridor is not None:
             return self.corridor
-        return "flight" if self.protection in {"governor", "full"} else "design"
+        return "design" if self.protection in PASSIVE_LAWS else "flight"

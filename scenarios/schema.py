@@ -26,7 +26,10 @@ DurationS = Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
 AccelerationKtS = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 NacelleRateDegS = Annotated[float, Field(ge=0.1, le=12.0, allow_inf_nan=False)]
 ClimbRateMS = Annotated[float, Field(ge=0.1, le=15.0, allow_inf_nan=False)]
-PilotName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$", max_length=200)]
+_PLUG_IN = r"[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?"
+PilotName = Annotated[str, Field(pattern=rf"^{_PLUG_IN}$", max_length=200)]
+ProtectionName = Annotated[str, Field(pattern=rf"^{_PLUG_IN}( *, *{_PLUG_IN})*$", max_length=1000)]
+"""Laws in the order in which they act: ``off``, ``monitor``, ``governor``, ``full``, entry points, MODULE:CLASS."""
 
 
 class Strict(BaseModel):
@@ -42,7 +45,7 @@ class FlightTable(Strict):
     outer_loop: Literal["integrators", "pi"] = "integrators"
     pilot: PilotName = "mocm"
     corridor: Literal["design", "flight"] | None = None
-    protection: Literal["off", "monitor", "governor", "full"] = "monitor"
+    protection: ProtectionName = "monitor"
     nacelle: NacelleName = "programme"
     rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0

@@ -13,6 +13,7 @@ from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults import fault_events
 from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.protection.chain import LawEvent
 from rtsim.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.simulation_kernels import END_GENTLE_LANDING
 from scenarios.disturbances import disturbance_event
@@ -85,6 +86,7 @@ class FlightSession:
         self._script = script
         self._nacelle_law = NacelleLawGuard(nacelle_law) if nacelle_law is not None else None
         self._failure = ""
+        self._in_block: tuple[int, int] | None = None
 
     @property
     def dt(self) -> float:
@@ -161,7 +163,9 @@ class FlightSession:
         scripted = self._script is not None and self.simulation.mode == "mocm"
         by_code = self._hands is not None or self._nacelle_law is not None
         if not by_code and not scripted and (self._pilot is None or self.simulation.mode != "external"):
+            self._in_block = (self.rows, self.simulation.frame_index)
             rows = self.simulation.run(frames)
+            self._in_block = None
             self.rows += len(rows)
             return rows
         rows = np.empty((frames, SIGNAL_COUNT))
@@ -233,6 +237,25 @@ class FlightSession:
         """
         self._tell("aid", f"{name.replace('_', ' ')} {'on' if on else 'off'}", {"aid": name, "on": int(on)})
         self.simulation.set_aid(name, on)
+
+    def override_protection(self) -> None:
+        """Take the authority from the protection law from the coming frame on, or give it back."""
+        on = not self.simulation.protection_overridden
+        text = "the pilot overrides the protection" if on else "the protection has its authority back"
+        self._tell("override", text, {"on": int(on)}, level="warning" if on else "info")
+        self.simulation.set_protection_override(on)
+
+    def law_event(self, event: LawEvent) -> None:
+        """Record what a protection law did besides its work; a replay does the same to it.
+
+        Args:
+            event: From the simulation's chain of laws.
+        """
+        data: dict[str, Any] = {"law": event.law, "what": event.kind, "ended": int(event.ended)}
+        if self._in_block is not None:
+            rows, frame = self._in_block  # counted when the block is over
+            data["row"] = rows + self.simulation.frame_index - frame
+        self._tell("law", event.text, data, level="warning")
 
     def tell(self, kind: str, text: str) -> None:
         """Make an event that changes nothing a replay would need.

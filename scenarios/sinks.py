@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from rtsim.corridor import LEVEL_NAMES
 from rtsim.errors import OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
 from telemetry.log_format import LogEvent
+
+if TYPE_CHECKING:
+    from scenarios.limit_watch import LimitWatch
 
 _CHUNK = 4096
 _VIEW_PIECE = 64
@@ -158,6 +161,7 @@ class FlightSinks:
         view: RowView | None = None,
         mirror: RowMirror | None = None,
         watch_corridor: bool = True,
+        limits: Callable[[Callable[[LogEvent], None]], LimitWatch] | None = None,
         on_rows: Callable[[FloatArray], None] | None = None,
         on_event: Callable[[LogEvent], None] | None = None,
     ) -> None:
@@ -168,6 +172,7 @@ class FlightSinks:
             view: Shows what it can.
             mirror: Shown every row of a paced flight beside the view (MAVLink).
             watch_corridor: Make events of changes of the corridor level.
+            limits: Makes what watches limits and protection from whom it tells; None: nobody watches.
             on_rows: Told the last row flown (progress and status lines); must be quick.
             on_event: Told every event; must be quick.
         """
@@ -176,6 +181,7 @@ class FlightSinks:
         self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
         self._mirror = mirror
         self._watch_corridor = watch_corridor
+        self._limits = limits(self.event) if limits is not None else None
         self._level = 0.0
         self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
 
@@ -206,6 +212,8 @@ class FlightSinks:
                 self._drop_log(row, self._log.failure)
         if self._watch_corridor and row[COLUMN.corridor_level] != self._level:
             self._tell_level(row)
+        if self._limits is not None:
+            self._limits.row(row)
         if self._on_rows is not None:
             self._on_rows(row)
 
@@ -229,8 +237,15 @@ class FlightSinks:
             before = np.concatenate(([self._level], levels[:-1]))
             for number in np.flatnonzero(levels != before):
                 self._tell_level(rows[number])
+        if self._limits is not None:
+            self._limits.flush()
+            self._limits.rows(rows)
         if self._on_rows is not None:
             self._on_rows(rows[-1])
+
+    def watched(self) -> dict[str, Any]:
+        """What was seen of limits and protection, for the summary; empty where nobody watched."""
+        return self._limits.summary() if self._limits is not None else {}
 
     def event(self, event: LogEvent) -> None:
         """Keep and show an event.

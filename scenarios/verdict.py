@@ -6,7 +6,7 @@ import dataclasses
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
 from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
 from scenarios.metrics import flight_metrics
-from scenarios.scenario import PlantName, Protection, Scenario
+from scenarios.scenario import PlantName, Scenario
 from scenarios.verdict_events import new_violations
 from scenarios.verdict_metrics import TrialMetrics
 from scenarios.verdict_trial import Trial
@@ -197,17 +197,13 @@ class Tester:
             wall_s=time.perf_counter() - begin,
         )
 
-    def _protection(self) -> Protection | None:
-        """The law as scenarios without a trial take it."""
-        return next((name for name in get_args(Protection) if name == self._law), None)
-
     def _flight_case(self, scenario: Scenario) -> Case:
         """A scenario without a trial: one flight, judged by its own expectations."""
         from scenarios.options import Overrides
         from scenarios.runner import fly
 
         begin = time.perf_counter()
-        overrides = Overrides(plant=scenario.plant, protection=self._protection())
+        overrides = Overrides(plant=scenario.plant, protection=self._law)
         record = fly(scenario, speed="max", overrides=overrides)
         findings = []
         for item in record.verdicts:

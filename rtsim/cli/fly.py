@@ -48,7 +48,7 @@ def fly_command(
         Literal["integrators", "pi"] | None, typer.Option(help="How the MOCM holds airspeed and altitude.")
     ] = None,
     protection: Annotated[
-        Literal["off", "monitor", "governor", "full"] | None, typer.Option(help="What to do about the corridor.")
+        str | None, typer.Option(help="off, monitor, governor, full, MODULE:CLASS, or several: A,B.")
     ] = None,
     nacelle: Annotated[
         str | None, typer.Option(help="Who sets the nacelle rate: programme, automatic or MODULE:CLASS.")
@@ -92,14 +92,15 @@ def fly_command(
 ) -> None:
     """Fly a scenario: the XV-15, the MOCM pilot, the conversion corridor, in real time unless --speed says otherwise.
 
-    While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, q quits.
+    While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, o
+    overrides the protection, q quits.
 
     Args:
         scenario: Name or path.
         pilot: Who flies.
         plant: Model to fly.
         outer_loop: How the MOCM holds airspeed and altitude.
-        protection: What to do about the corridor.
+        protection: Protection laws in the order in which they act.
         nacelle: Who sets the nacelle rate.
         corridor: Boundaries to watch.
         speed: Multiple of real time, or max.
@@ -133,6 +134,7 @@ def fly_command(
         OutputError: A log or recording failed.
         OverrunStop: The overrun policy ended the flight.
     """
+    from rtsim.protection import load_laws
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
     from scenarios.nacelle_laws import load_nacelle_law
@@ -162,6 +164,7 @@ def fly_command(
     chosen = chosen_scenario(scenario, overrides)
     load_pilot(chosen.pilot)
     load_nacelle_law(chosen.nacelle)
+    load_laws(chosen.protection)
     link = None
     if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
         from scenarios.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced

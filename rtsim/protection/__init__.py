@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rtsim.protection.boundary import BOUNDARY_NAMES, check_consistency, load_boundary
     from rtsim.protection.chain import LawChain, LawEvent, compiled_law
     from rtsim.protection.laws import BuiltInLaw, LawSpec, load_law, load_laws
-    from rtsim.protection.limits import LIMIT_KINDS, Limits, load_limits
+    from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, Limits, load_limits
     from rtsim.protection.monitor import MarginHistory, MarginMonitor, Reading
     from rtsim.protection.tables import LAW_NAMES, law_tables
 
@@ -27,6 +27,7 @@ _HOME = {
     "load_law": "laws",
     "load_laws": "laws",
     "LIMIT_KINDS": "limits",
+    "LIMIT_WORDS": "limits",
     "Limits": "limits",
     "load_limits": "limits",
     "MarginHistory": "monitor",
@@ -40,6 +41,7 @@ __all__ = [
     "BOUNDARY_NAMES",
     "LAW_NAMES",
     "LIMIT_KINDS",
+    "LIMIT_WORDS",
     "BuiltInLaw",
     "LawChain",
     "LawEvent",

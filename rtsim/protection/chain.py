@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -90,8 +90,6 @@ class LawChain:
         *,
         dt: float,
         live: bool = False,
-        skip: Collection[tuple[int, str]] = (),
-        end: Collection[tuple[int, str]] = (),
         on_event: Callable[[LawEvent], None] | None = None,
         remember: bool = False,
     ) -> None:
@@ -102,8 +100,6 @@ class LawChain:
             dt: Length of a frame [s].
             live: The flight runs against the clock: calls that took too long are followed by skipped ones. A batch
                 never skips, so that its commands do not depend on the machine.
-            skip: Calls to skip as (frame, law), from the record of a live flight that is replayed.
-            end: Frames in which laws were ended, (frame, law), from the same record.
             on_event: Told about every event.
             remember: Keep all calls, for ``unrepeatable``.
 
@@ -120,7 +116,6 @@ class LawChain:
         self.reasons: tuple[float, ...] = (0.0, 0.0, 0.0)
         """Number of the limit that changed stick, lever and nacelle rate; ``OTHER_REASON`` for a law's own limits."""
         self._specs = tuple(laws)
-        self._skip, self._end = frozenset(skip), frozenset(end)
         self._laws: list[ProtectionLaw | None] = []
         self._waiting: list[int] = []
         self._calls: list[list[_Call]] = []
@@ -163,11 +158,31 @@ class LawChain:
             except Exception as error:
                 raise InputError(
                     f"the law cannot be copied: {type(error).__name__}: {error}",
-                    key="protection",
+                    key="--protection",
                     value=spec.name,
                     mend="keep plain values, arrays and objects that copy.deepcopy can copy",
                 ) from error
         return tuple(copies)
+
+    def end(self, name: str) -> None:
+        """End a law, as a live flight that is replayed ended it.
+
+        Args:
+            name: The law.
+        """
+        for place, spec in enumerate(self._specs):
+            if spec.name == name:
+                self._laws[place] = None
+
+    def skip(self, name: str) -> None:
+        """Skip a law's next call, as a live flight that is replayed skipped it.
+
+        Args:
+            name: The law.
+        """
+        for place, spec in enumerate(self._specs):
+            if spec.name == name:
+                self._waiting[place] = 1
 
     def due(self, frame: int) -> bool:
         """Whether the laws decide in this frame, and so need sensors and margins.
@@ -246,11 +261,7 @@ class LawChain:
         self, frame: int, place: int, sensors: Sensors, command: Command, margins: Margins
     ) -> GuardedAnswer | None:
         law, name = self._laws[place], self._specs[place].name
-        if law is not None and (frame, name) in self._end:
-            self._laws[place] = law = None
         if law is None:
-            return None
-        if (frame, name) in self._skip:
             return None
         if self._waiting[place] > 0:
             self._waiting[place] -= 1

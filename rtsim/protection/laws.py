@@ -195,7 +195,7 @@ class LawSpec:
         except Exception as error:
             raise InputError(
                 f"the law cannot be made: {type(error).__name__}: {error}",
-                key="protection",
+                key="--protection",
                 value=self.name,
                 mend="its class must take no arguments",
             ) from error
@@ -247,7 +247,7 @@ def _find(name: str) -> Callable[[], ProtectionLaw]:
     if not callable(target) or not callable(getattr(target, "step", None)):
         raise InputError(
             "is not a protection law: it is no class with a method step(sensors, command, margins, dt)",
-            key="protection",
+            key="--protection",
             value=name,
             mend="see docs/protection.md",
         )
@@ -266,14 +266,14 @@ def _from_module(name: str) -> Any:
         own = module_name == missing or module_name.startswith(f"{missing}.")
         raise InputError(
             f"there is no module {missing}" if own else f"its module needs {missing}, which is not installed",
-            key="protection",
+            key="--protection",
             value=name,
             mend="name a module of the current directory or an installed one" if own else f"install {missing}",
         ) from error
     except Exception as error:
         raise InputError(
             f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
-            key="protection",
+            key="--protection",
             value=name,
             mend="correct the module",
         ) from error
@@ -282,7 +282,7 @@ def _from_module(name: str) -> Any:
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "step")]
         raise InputError(
             f"the module {module_name} has no class {class_name}",
-            key="protection",
+            key="--protection",
             value=name,
             allowed=", ".join(classes) or None,
             mend=_suggestion(class_name, classes, otherwise="name a class with a method step"),
@@ -296,7 +296,7 @@ def _from_entry_point(name: str) -> Any:
         choices = [*LAW_NAMES, *offered]
         raise InputError(
             "is not a protection law",
-            key="protection",
+            key="--protection",
             value=name,
             allowed=", ".join([*choices, "MODULE:CLASS"]),
             mend=_suggestion(name, choices, otherwise="choose one"),
@@ -306,7 +306,7 @@ def _from_entry_point(name: str) -> Any:
     except Exception as error:
         raise InputError(
             f"the entry point cannot be loaded: {type(error).__name__}: {error}",
-            key="protection",
+            key="--protection",
             value=name,
             mend="reinstall the package that offers it",
         ) from error

@@ -157,7 +157,9 @@ class MarginMonitor:
         ahead, side, distance = np.zeros(frames), np.zeros(frames), np.zeros(frames)
         margins, levels = np.zeros((frames, KIND_COUNT)), np.zeros((frames, KIND_COUNT))
         monitor_kernels.predict(self._law, sensors, acting, ahead, side)
-        monitor_kernels.watch(self.tables, sensors, ahead, self.dt, margins, levels, distance)
+        state = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
+        monitor_kernels.watch(self.tables, sensors, ahead, self.dt, state, margins, levels)
+        monitor_kernels.distances(self.tables, sensors, distance)
         return MarginHistory(rows[:, COLUMN.time_s].copy(), margins, levels, distance, ahead, side)
 
 

@@ -187,25 +187,36 @@ def watch(
     sensors: FloatArray,
     time_to_limit: FloatArray,
     dt: float,
+    state: FloatArray,
     margins: FloatArray,
     levels: FloatArray,
-    distance: FloatArray,
 ) -> None:
-    """Monitor a whole flight.
+    """Monitor consecutive frames.
 
     Args:
         tables: Limits and levels.
         sensors: One row per frame (frames, SENSOR_COUNT).
         time_to_limit: One per frame (frames,) [s].
         dt: Length of a frame [s].
+        state: Of the levels, updated in place, zeros at the start of a flight (LEVEL_STATE_SIZE,).
         margins: Written (frames, KIND_COUNT).
         levels: Written (frames, KIND_COUNT).
-        distance: Written: normalized distance (frames,).
     """
-    state = np.zeros(LEVEL_STATE_SIZE)
     for k in range(sensors.shape[0]):
         limit_margins(tables, sensors[k], time_to_limit[k], margins[k])
         levels_step(tables, margins[k], dt, state, levels[k])
+
+
+@kernel
+def distances(tables: MonitorTables, sensors: FloatArray, distance: FloatArray) -> None:
+    """Normalized distance over a whole flight.
+
+    Args:
+        tables: The corridor.
+        sensors: One row per frame (frames, SENSOR_COUNT).
+        distance: Written (frames,).
+    """
+    for k in range(sensors.shape[0]):
         distance[k] = normalized_distance(tables, sensors[k, SENSE_AIRSPEED], sensors[k, SENSE_NACELLE])
 
 

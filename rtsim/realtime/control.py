@@ -14,7 +14,18 @@ if TYPE_CHECKING:
     from rtsim.simulation import Disturbance
 
 Action = Literal[
-    "pause", "resume", "toggle-pause", "step", "speed", "faster", "slower", "reset", "pilot", "disturb", "stop"
+    "pause",
+    "resume",
+    "toggle-pause",
+    "step",
+    "speed",
+    "faster",
+    "slower",
+    "reset",
+    "pilot",
+    "override",
+    "disturb",
+    "stop",
 ]
 
 WARP_STEPS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -102,6 +113,10 @@ class FlightControl:
             pilot: ``mocm``, ``external`` or ``hold``, or ``next`` for the next one that is available.
         """
         self.requests.append(Request("pilot", text=pilot))
+
+    def override_protection(self) -> None:
+        """Take the authority from the protection law, which goes on watching, or give it back."""
+        self.requests.append(Request("override"))
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend.

@@ -90,6 +90,10 @@ class FrameSource(Protocol):
         """
         ...
 
+    def override_protection(self) -> None:
+        """Take the authority from the protection law, or give it back."""
+        ...
+
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend.
 
@@ -277,6 +281,8 @@ class Executive:
             self._reschedule()
         elif action == "pilot":
             self.source.switch_pilot(request.text)
+        elif action == "override":
+            self.source.override_protection()
         elif action == "disturb" and request.change is not None:
             self.source.disturb(request.change)
         elif action == "stop":

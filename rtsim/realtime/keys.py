@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from rtsim.realtime.control import FlightControl
 
-KEY_HELP = "space pause, . one frame, + - warp, r reset, p pilot, q quit"
+KEY_HELP = "space pause, . one frame, + - warp, r reset, p pilot, o override protection, q quit"
 """One line for the user."""
 POLL_S = 0.1
 """How long the reading thread waits at a time [s]; a waiting thread costs the loop nothing."""
@@ -39,6 +39,8 @@ def press(control: FlightControl, key: str) -> None:
         control.reset()
     elif key == "p":
         control.set_pilot("next")
+    elif key == "o":
+        control.override_protection()
     elif key == "q":
         control.stop("stopped by the key q")
 
