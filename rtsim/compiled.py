@@ -1,15 +1,24 @@
 """How kernels are compiled: one decorator for all of them.
 
 numpy's division semantics spare a check at every division (the rotor's blade elements run four times faster), the
-machine code is cached beside the source, and ``fastmath`` stays off: results are bit-reproducible on one machine type.
+machine code is cached on disk (``rtsim.kernel_cache``), and ``fastmath`` stays off: results are bit-reproducible on one
+machine type.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+
+from rtsim.kernel_cache import cache_folder
+
+_folder = cache_folder(Path(__file__).resolve().parents[1])
+if _folder is not None:
+    _configuration: Any = numba.config  # its names are made at run time
+    _configuration.CACHE_DIR = str(_folder)
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

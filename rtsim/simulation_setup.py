@@ -14,7 +14,6 @@ from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
-from rtsim.corridor import load_corridor
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
@@ -31,7 +30,7 @@ from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.plant_kernels import AircraftFrame
 from rtsim.programme import Programme
-from rtsim.protection.boundary import BoundaryName
+from rtsim.protection.boundary import BoundaryName, load_boundary
 from rtsim.protection.chain import compiled_law
 from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE
 from rtsim.protection.law_kernels import law_start
@@ -57,7 +56,7 @@ class FlightSetup:
     """How the MOCM holds airspeed and altitude."""
     pilot: Literal["mocm", "external"] = "mocm"
     """Who flies at frame 0."""
-    corridor: Literal["design", "flight"] = "design"
+    corridor: BoundaryName = "design"
     """Boundaries to watch."""
     rate_hz: int = 250
     """Frames per second."""
@@ -150,7 +149,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
         nacelle=load_nacelle_tables(),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
-        corridor=load_corridor(setup.corridor).tables(),
+        corridor=load_boundary(setup.corridor, database).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
         aids=design_aids(database),
         gusts=gust_tables(setup.air),

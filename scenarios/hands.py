@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol, get_args
 from rtsim.aids import AIDS, AidName
 from rtsim.aids.aids_kernels import MAP_STICK, scheduled
 from rtsim.command import Command
-from rtsim.corridor import load_corridor
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.protection import load_boundary
 from rtsim.realtime import FlightControl
 from rtsim.simulation import PilotMode, Simulation
 from rtsim.sticks import INPUT_LIVE, INPUT_NONE, StickHandler, StickSettings, StickSituation, transition_schedule
@@ -73,7 +73,7 @@ class Hands:
         self._settings = StickSettings()
         for name, value in link.config.parameters.items():
             self._settings = self._settings.with_parameter(name, value)
-        self._schedule = transition_schedule(load_corridor(simulation.setup.corridor))
+        self._schedule = transition_schedule(load_boundary(simulation.setup.corridor))
         self._waits = waits
         self._deferred: list[Request] = []
         self._frames = 0

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_type_hints
 from pydantic import TypeAdapter
 
 import rtsim
-from rtsim.corridor import load_corridor
 from rtsim.errors import OutputError
 from rtsim.frame import FloatArray, history_sha256
 from rtsim.programme import Programme
+from rtsim.protection import load_boundary
 from rtsim.realtime import Executive, FlightControl, OverrunPolicy
 from rtsim.realtime.report import TimingReport
 from rtsim.simulation import FlightSetup, Simulation
@@ -204,9 +204,9 @@ def corridor_outline(name: str) -> CorridorOutline:
     """The boundaries of a corridor as plain arrays, for views and logs.
 
     Args:
-        name: ``design`` or ``flight``.
+        name: ``design``, ``flight`` or ``model``.
     """
-    corridor = load_corridor(name)
+    corridor = load_boundary(name)
     high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
     high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
     high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]

@@ -15,7 +15,7 @@ from scenarios.verdict_trial import Trial
 
 PlantName = Literal["lpv", "lpv-plain", "nonlinear"]
 OuterLoop = Literal["integrators", "pi"]
-CorridorName = Literal["design", "flight"]
+CorridorName = Literal["design", "flight", "model"]
 PASSIVE_LAWS = frozenset({"off", "monitor"})
 """Protection that changes no command."""
 PilotMode = Literal["mocm", "external", "hold"]

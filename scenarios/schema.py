@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
 from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
 from scenarios.nacelle_laws import AutomaticTable, NacelleName
-from scenarios.scenario import AidName
+from scenarios.scenario import AidName, CorridorName
 from scenarios.verdict_schema import PulseTable, TrialTable
 
 FORMAT = 1
@@ -44,7 +44,7 @@ class FlightTable(Strict):
     plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
     outer_loop: Literal["integrators", "pi"] = "integrators"
     pilot: PilotName = "mocm"
-    corridor: Literal["design", "flight"] | None = None
+    corridor: CorridorName | None = None
     protection: ProtectionName = "monitor"
     nacelle: NacelleName = "programme"
     rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.corridor import load_corridor
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.protection import load_boundary
 from rtsim.protection.limits import LIMIT_KINDS
 from rtsim.units import to_deg, to_kt
 from scenarios.verdict import Case
@@ -194,7 +194,7 @@ def _flights(case: Case) -> list[tuple[str, FloatArray, str]]:
 
 
 def _draw_path(axes: Any, case: Case) -> None:
-    corridor = load_corridor(case.scenario.corridor or ("flight" if case.off is not None else "design"))
+    corridor = load_boundary(case.scenario.corridor or ("flight" if case.off is not None else "design"))
     angles = np.linspace(0.0, np.pi / 2.0, 181)
     axes.plot(to_kt(np.asarray(corridor.low.at(angles))), to_deg(angles), color="#b3261e", linewidth=1.2)
     axes.plot(to_kt(np.asarray(corridor.high.at(angles))), to_deg(angles), color="#b3261e", linewidth=1.2)

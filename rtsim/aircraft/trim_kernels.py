@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
 
 from rtsim.aircraft.dynamics_kernels import WORK_COUNT, derivative
 from rtsim.aircraft.signals import INPUT, INPUTS, STATE, STATES
 from rtsim.aircraft.table_kernels import FloatArray, curve
 from rtsim.aircraft.tables import AircraftTables
+from rtsim.compiled import kernel
 
 UNKNOWNS = 9
 RESIDUAL_ROWS = (
@@ -39,7 +39,7 @@ Flight = tuple[float, float, float]
 """Horizontal airspeed [m/s], acceleration along it [m/s^2], nacelle angle [rad]."""
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def trim_vectors(tables: AircraftTables, flight: Flight, z: FloatArray, x: FloatArray, u: FloatArray) -> None:
     """State and inputs of a set of unknowns; the actuators stand where stick and lever ask them to, stops ignored.
 
@@ -68,7 +68,7 @@ def trim_vectors(tables: AircraftTables, flight: Flight, z: FloatArray, x: Float
     u[INPUT.lever] = (z[2] - low) / (high - low)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def trim_residual(tables: AircraftTables, flight: Flight, z: FloatArray, residual: FloatArray) -> None:
     """Scaled residuals of a set of unknowns.
 
@@ -87,7 +87,7 @@ def trim_residual(tables: AircraftTables, flight: Flight, z: FloatArray, residua
         residual[i] = RESIDUAL_SCALE[i] * xdot[RESIDUAL_ROWS[i]]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel
 def trim_jacobian(tables: AircraftTables, flight: Flight, z: FloatArray, jacobian: FloatArray) -> None:
     """Jacobian of the residuals by central differences.
 

@@ -30,9 +30,14 @@ def register(app: typer.Typer) -> None:
 
 def corridor_command(
     *,
-    corridor: Annotated[str, typer.Option(help="Which corridor: design or flight.")] = "design",
+    corridor: Annotated[
+        str, typer.Option(help="Which corridor: design, flight, or model (what the shipped aircraft's trims allow).")
+    ] = "design",
     airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed of a point [kn].")] = None,
     nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle of the point [deg], 90 helicopter.")] = None,
+    consistency: Annotated[
+        bool, typer.Option("--consistency", help="Say where the corridor allows what the aircraft cannot trim.")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
 ) -> None:
@@ -42,6 +47,7 @@ def corridor_command(
         corridor: Name of the corridor.
         airspeed_kt: Airspeed of a point [kn].
         nacelle_deg: Nacelle angle of the point [deg].
+        consistency: Compare the corridor with the trims of the shipped aircraft.
         json: Print one JSON object on stdout.
         plot: File to draw into.
 
@@ -52,11 +58,18 @@ def corridor_command(
     from rtsim.units import deg, kt
 
     point = _point(airspeed_kt, nacelle_deg)
-    chosen = load_corridor(corridor)
+    if corridor == "model":
+        from rtsim.protection import load_boundary
+
+        chosen = load_boundary(corridor)
+    else:
+        chosen = load_corridor(corridor)
     result: dict[str, Any] = {"corridor_name": chosen.name, "boundaries": _boundaries(chosen)}
     if point is not None:
         margins = chosen.margins(kt(point[0]), deg(point[1]))
         result |= _point_result(chosen, point, margins)
+    if consistency:
+        result["consistency"] = _inconsistencies(chosen)
     if plot is not None:
         _draw(chosen, point, plot)
         result["plot_file"] = str(plot)
@@ -67,8 +80,37 @@ def corridor_command(
         _print_point(result)
     else:
         _print_table(chosen)
+    if consistency:
+        _print_consistency(result["consistency"])
     if plot is not None:
         console.print(f"Drew {plot}")
+
+
+def _inconsistencies(corridor: Corridor) -> list[dict[str, Any]]:
+    """Stretches where the corridor is wider than the level trims of the shipped aircraft within their limits."""
+    from rtsim.lpv.storage import load_database
+    from rtsim.protection import check_consistency
+    from rtsim.units import to_deg, to_kt
+
+    return [
+        {
+            "side": found.side,
+            "nacelle_from_deg": round(to_deg(found.nacelle_from), _DIGITS),
+            "nacelle_to_deg": round(to_deg(found.nacelle_to), _DIGITS),
+            "depth_kt": round(to_kt(found.depth), _DIGITS),
+            "nacelle_deepest_deg": round(to_deg(found.nacelle_deepest), _DIGITS),
+            "sentence": found.sentence(),
+        }
+        for found in check_consistency(corridor, load_database())
+    ]
+
+
+def _print_consistency(found: list[dict[str, Any]]) -> None:
+    if not found:
+        results.print("The aircraft's level trims reach all of this corridor within their limits.")
+    for item in found:
+        sentence = item["sentence"]
+        results.print(f"{sentence[0].upper()}{sentence[1:]}.", highlight=False)
 
 
 def _point(airspeed_kt: float | None, nacelle_deg: float | None) -> tuple[float, float] | None:

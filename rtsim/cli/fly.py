@@ -53,7 +53,7 @@ def fly_command(
     nacelle: Annotated[
         str | None, typer.Option(help="Who sets the nacelle rate: programme, automatic or MODULE:CLASS.")
     ] = None,
-    corridor: Annotated[Literal["design", "flight"] | None, typer.Option(help="Boundaries to watch.")] = None,
+    corridor: Annotated[Literal["design", "flight", "model"] | None, typer.Option(help="Boundaries to watch.")] = None,
     speed: Annotated[str, typer.Option(help="Multiple of real time, or max.")] = "1",
     rate: Annotated[int | None, typer.Option(help="Frames per second [Hz].", show_default="250")] = None,
     seed: Annotated[int | None, typer.Option(help="Root of every random stream.", show_default="0")] = None,

@@ -103,19 +103,25 @@ def _crossing(speeds: FloatArray, spare: FloatArray) -> float:
     return float(speeds[-1])
 
 
-def load_boundary(name: str, database: Database) -> Corridor:
+def load_boundary(name: str, database: Database | None = None) -> Corridor:
     """Load a boundary by name.
 
     Args:
         name: ``design``, ``flight`` or ``model``.
-        database: What ``model`` is computed from.
+        database: What ``model`` is computed from; None: the shipped XV-15.
 
     Raises:
         InputError: There is no such boundary.
     """
     if name not in BOUNDARY_NAMES:
         raise InputError("no such boundary", key="corridor", value=name, allowed=", ".join(BOUNDARY_NAMES))
-    return model_corridor(database) if name == "model" else load_corridor(name)
+    if name != "model":
+        return load_corridor(name)
+    if database is None:
+        from rtsim.lpv.storage import load_database
+
+        database = load_database()
+    return model_corridor(database)
 
 
 def guarded_corridor(corridor: Corridor, database: Database, guard: float) -> Corridor:

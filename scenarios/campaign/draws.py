@@ -7,10 +7,11 @@ import functools
 import numpy as np
 
 from rtsim.atmosphere import AirSpecification, Gust, Turbulence
-from rtsim.corridor import Corridor, load_corridor
+from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
+from rtsim.protection import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
 from rtsim.units import deg, kt, to_deg, to_kt
 from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
@@ -42,7 +43,7 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
         duration = scenario.duration if item.duration_s is None else item.duration_s
     else:
         start = _start(item, spec.corridor, generator)
-        programme = _programme(item, start, load_corridor(spec.corridor), generator)
+        programme = _programme(item, start, load_boundary(spec.corridor), generator)
         duration = spec.duration_s if item.duration_s is None else item.duration_s
     pulses = tuple(pulse for table in item.pulses for pulse in _pulses(table, generator))
     faults = tuple(_faults(item, generator))
@@ -69,7 +70,7 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
 def _start(item: ClassTable, corridor_name: str, generator: Generator) -> ProgrammePoint:
     table = item.start
     assert table is not None  # the file was checked
-    corridor = load_corridor(corridor_name)
+    corridor = load_boundary(corridor_name)
     for _ in range(ATTEMPTS):
         nacelle = float(np.clip(draw(table.nacelle_deg, generator), 0.0, 90.0))
         angle = deg(nacelle)

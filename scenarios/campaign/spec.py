@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtsim.errors import InputError
 from scenarios.problems import closest, explain, suggestion
+from scenarios.scenario import CorridorName
 from scenarios.verdict_events import EVENTS
 
 Generator = np.random.Generator
@@ -166,7 +167,7 @@ class CampaignFile(Strict):
     law: str = "full"
     against: list[str] = []
     plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
-    corridor: Literal["design", "flight"] = "flight"
+    corridor: CorridorName = "flight"
     rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
     duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 40.0
     runs: Annotated[int, Field(ge=1, le=10_000_000)] = 50

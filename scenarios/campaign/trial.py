@@ -20,6 +20,7 @@ from rtsim.faults.schedule import fault_tables
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.protection import law_data
+from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import load_limits
@@ -95,7 +96,7 @@ class Bench:
         self,
         *,
         plant: Plant = "lpv",
-        corridor: Literal["design", "flight"] = "flight",
+        corridor: BoundaryName = "flight",
         rate_hz: int = 250,
     ) -> None:
         """Remember what to fly; parts are loaded with the first flight.

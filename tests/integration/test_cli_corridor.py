@@ -74,3 +74,24 @@ def test_refusals_say_what_is_allowed(capsys, arguments, code, words):
     err = capsys.readouterr().err
     assert words in err
     assert err.count("\n") == 1
+
+
+def test_a_chart_is_compared_with_what_the_aircraft_can_trim(capsys):
+    """The design chart's low side lies beyond the plant's stall, so laws keep the flight line; that does not."""
+    design = answer(capsys, "--consistency")["consistency"]
+    assert {"low", "high"} == {item["side"] for item in design}
+    assert max(item["depth_kt"] for item in design if item["side"] == "low") > 10.0
+    flight = answer(capsys, "--corridor", "flight", "--consistency")["consistency"]
+    assert {item["side"] for item in flight} == {"high"}
+    assert "mast torque" in flight[0]["sentence"]
+    assert run(["corridor", "--corridor", "flight", "--consistency"]) == 0
+    assert "The chart's high-speed side lies up to" in capsys.readouterr().out
+
+
+def test_the_corridor_of_the_aircraft_itself(capsys):
+    result = answer(capsys, "--corridor", "model", "--consistency", "--airspeed-kt", "105", "--nacelle-deg", "50")
+    assert result["corridor_name"] == "model"
+    assert result["consistency"] == []
+    assert 70.0 < result["low_kt"] < 92.5  # slower than the power-on stall line of TM 81244
+    assert run(["corridor", "--corridor", "model", "--consistency"]) == 0
+    assert "reach all of this corridor" in " ".join(capsys.readouterr().out.split())

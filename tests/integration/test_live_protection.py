@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections import deque
 from pathlib import Path
 
@@ -165,3 +166,17 @@ def test_a_law_that_does_not_exist_is_a_mistake_of_the_user(capsys: pytest.Captu
     message = " ".join(capsys.readouterr().err.split())
     assert "govenor" in message
     assert "did you mean governor?" in message
+
+
+def test_the_law_of_the_documentation_flies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "protection.md").read_text(encoding="utf-8")
+    code = re.search(r"^```python\n(.*?)^```", page, flags=re.DOTALL | re.MULTILINE)
+    assert code is not None
+    (tmp_path / "documented_law.py").write_text(code[1], encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    overrides = Overrides(protection="documented_law:StopTheNacelles")
+    flight = scenarios.fly("ep04_wrong_nacelle_command", speed="max", overrides=overrides)
+    bare = scenarios.fly("ep04_wrong_nacelle_command", speed="max", overrides=Overrides(protection="monitor"))
+    assert told(flight, "law") == []
+    assert "protection acts on the nacelles: the corridor's low-speed side" in {event.text for event in flight.events}
+    assert flight["nacelle_deg"].min() > bare["nacelle_deg"].min() + 10.0
