@@ -176,7 +176,7 @@ class Executive:
         Returns:
             What was measured.
         """
-        with loop_conditions():
+        with loop_conditions(collect=self._speed != math.inf):
             start = time.perf_counter_ns() + (0 if self._speed == math.inf else LEAD_NS)
             self._begin_section(start)
             self.control.speed = self._speed
@@ -338,15 +338,19 @@ class Executive:
 
 
 @contextmanager
-def loop_conditions() -> Iterator[None]:
+def loop_conditions(*, collect: bool = True) -> Iterator[None]:
     """Keep the interpreter out of the loop's way.
 
     Garbage is collected once before; what is alive then is frozen and the collector is switched off, since a full
     collection of a program of this size takes longer than a frame. The loop itself makes no reference cycles, so
     nothing piles up. Other threads must give the interpreter back after 0.5 ms. All of it is undone at the end.
+
+    Args:
+        collect: Collect before. A flight that is not paced need not: it would wait for it half as long as it flies.
     """
     was_enabled, interval = gc.isenabled(), sys.getswitchinterval()
-    gc.collect()
+    if collect:
+        gc.collect()
     gc.freeze()
     gc.disable()
     sys.setswitchinterval(SWITCH_INTERVAL_S)
