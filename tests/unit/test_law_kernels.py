@@ -172,7 +172,7 @@ def test_full_stops_a_descent_that_is_too_steep(tables):
 def test_full_keeps_the_mast_torque(tables):
     """Measured at the limit, the lever goes no further; above it, the lever comes back."""
     bench = Bench(tables["full"], 105.0, 50.0)
-    bench.sensors[data.SENSE_TORQUE] = 0.98 * 130000.0 * INCH_POUND
+    bench.sensors[data.SENSE_TORQUE] = bench.tables.settings.torque_share * 130000.0 * INCH_POUND
     bench.step(frames=5)
     assert bench.step(lever=0.2, frames=100)[1] == pytest.approx(0.0, abs=2e-3)
     assert bench.cause("lever") == data.REASON_TORQUE
