@@ -172,6 +172,25 @@ METRIC_NAMES: tuple[str, ...] = _names()
 """Dotted names of all metrics, as used by the ``expect`` clauses of scenarios."""
 
 
+_LEAF_UNITS = {
+    "max_rate_deg_s": "deg/s", "peak_time_s": "s", "integral_deg_s": "deg s", "worst_margin_kt": "kn",
+    "time_outside_s": "s", "rms_in": "in", "rms_rate_in_s": "in/s", "travel_in": "in", "rms_rate_per_s": "1/s",
+}  # fmt: skip
+_GROUP_UNITS = {
+    "airspeed_kt": "kn", "nacelle_deg": "deg", "altitude_m": "m", "pitch_deg": "deg", "flapping_deg": "deg",
+}  # fmt: skip
+
+
+def metric_unit(name: str) -> str:
+    """The unit of a metric as people write it; empty for a number.
+
+    Args:
+        name: One of :data:`METRIC_NAMES`.
+    """
+    group, _, leaf = name.rpartition(".")
+    return _LEAF_UNITS.get(leaf, _GROUP_UNITS.get(group, ""))
+
+
 def nacelle_reference_deg(programme: Programme, time: FloatArray) -> FloatArray:
     """The programme's nacelle angle behind a critically damped 3 rad/s filter, in closed form.
 

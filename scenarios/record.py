@@ -27,6 +27,8 @@ class Verdict:
     """What was measured."""
     limit: float | bool | list[float]
     """What was allowed: a bound, or ``[minimum, maximum]``."""
+    metric: str = ""
+    """The metric that was measured, its unit in its name; empty for the first verdict, that the flight is completed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,5 +147,5 @@ def judge(
     verdicts = [Verdict(whole, completed, completed, True)]
     for clause in scenario.expectations:
         value = metrics.value(clause.metric) if metrics is not None else None
-        verdicts.append(Verdict(clause.name, clause.holds(value), value, clause.limit))
+        verdicts.append(Verdict(clause.name, clause.holds(value), value, clause.limit, clause.metric))
     return tuple(verdicts)

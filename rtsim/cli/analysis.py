@@ -148,18 +148,38 @@ def linearize_command(
         _print_model(result)
 
 
+_TRIM_ROWS = (
+    ("flap_deg", "flaps", "deg", 1),
+    ("rotor_rpm", "rotor speed", "rpm", 0),
+    ("pitch_deg", "pitch attitude, nose up positive", "deg", 2),
+    ("stick_in", "stick from neutral, forward positive", "in", 2),
+    ("elevator_deg", "elevator, trailing edge down positive", "deg", 2),
+    ("cyclic_deg", "longitudinal cyclic, forward negative", "deg", 2),
+    ("collective_75_deg", "collective at 75 % radius", "deg", 2),
+    ("lever_fraction", "power lever, 0 to 1", "-", 3),
+    ("thrust_per_rotor_lb", "thrust of each rotor", "lb", 0),
+    ("power_shp", "shaft power of both rotors", "shp", 0),
+    ("engine_power_shp", "power of both engines", "shp", 0),
+    ("mast_torque_inlb", "torque of each mast", "in lb", 0),
+    ("flapping_deg", "cyclic flapping", "deg", 2),
+)
+"""What people are shown of a trim: key, words, unit, decimals."""
+
+
 def _print_trim(result: dict[str, Any]) -> None:
     from rich.table import Table
 
     table = Table(
         title=f"Trim at {result['airspeed_kt']:g} kn, nacelle {result['nacelle_deg']:g} deg", show_header=False
     )
-    for name, value in result.items():
-        if isinstance(value, bool):
-            table.add_row(name, "yes" if value else "no")
-        else:
-            table.add_row(name, value if isinstance(value, str) else f"{value:.4g}")
+    for justify in ("left", "right", "left"):
+        table.add_column(justify=justify)  # type: ignore[arg-type]
+    for key, words, unit, decimals in _TRIM_ROWS:
+        table.add_row(words, f"{round(result[key], decimals) + 0.0:,.{decimals}f}".replace(",", " "), unit)
     results.print(table)
+    inside = "inside" if result["inside_corridor"] else "OUTSIDE"
+    origin = "solved by the nonlinear model" if result["source"] == "nonlinear" else "from the LPV database"
+    results.print(f"{inside.capitalize()} the design corridor; {origin}. The same with --json, by key.")
 
 
 def _print_model(result: dict[str, Any]) -> None:
@@ -177,5 +197,9 @@ def _print_model(result: dict[str, Any]) -> None:
         results.print(f"The loop as flown is {verdict}: slowest growth {result['growth_rad_s']:+.4f} rad/s")
     for kind in ("states", "inputs", "outputs"):
         if result[kind]:
-            results.print(f"{kind.capitalize()}: " + ", ".join(result[kind]))
-    results.print("The matrices are printed with --json.")
+            named = [pair for pair in zip(result[kind], result["units"][kind], strict=True) if pair[0][:6] != "pilot_"]
+            words = [f"{name} [{unit or '-'}]" for name, unit in named]
+            if len(named) < len(result[kind]):
+                words.append(f"and {len(result[kind]) - len(named)} of pilot and outer loops")
+            results.print(f"{kind.capitalize()}: " + ", ".join(words))
+    results.print("The matrices A, B, C and D are printed with --json.")

@@ -164,8 +164,9 @@ def _point_result(corridor: Corridor, point: tuple[float, float], margins: Margi
     return {
         "airspeed_kt": airspeed_kt,
         "nacelle_deg": nacelle_deg,
-        "low_kt": round(airspeed_kt - to_kt(margins.low), _DIGITS),
-        "high_kt": round(airspeed_kt + to_kt(margins.high), _DIGITS),
+        # Adding zero turns a rounded -0.0 into 0.0.
+        "low_kt": round(airspeed_kt - to_kt(margins.low), _DIGITS) + 0.0,
+        "high_kt": round(airspeed_kt + to_kt(margins.high), _DIGITS) + 0.0,
         "centre_kt": round(to_kt(float(corridor.centre_speed(deg(nacelle_deg)))), _DIGITS),
         "margin_low_kt": round(to_kt(margins.low), _DIGITS),
         "margin_high_kt": round(to_kt(margins.high), _DIGITS),

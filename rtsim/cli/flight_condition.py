@@ -236,7 +236,7 @@ def no_trim(request: Request, point: TrimPoint) -> TrimError:
     """
     where = f"{request.airspeed_kt:g} kn at nacelle {request.nacelle_deg:g} deg"
     left = f"; '{point.unclosed}' does not close" if getattr(point, "unclosed", "") else ""
-    mend = "see the feasible region with 'rtsim model info'"
+    mend = "see where the aircraft flies with 'rtsim corridor'"
     if not request.solves_nonlinear:
         mend += ", or solve exactly there with --nonlinear"
     return TrimError(f"there is no level-flight trim at {where}{left}", mend=mend)

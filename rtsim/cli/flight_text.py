@@ -15,7 +15,7 @@ from rtsim.cli.output import console, progress
 if TYPE_CHECKING:
     from rtsim.frame import FloatArray
     from rtsim.realtime import FlightControl
-    from scenarios.record import FlightRecord
+    from scenarios.record import FlightRecord, Verdict
     from scenarios.scenario import Scenario
     from telemetry.log_format import LogEvent
 
@@ -215,8 +215,8 @@ def summarize(record: FlightRecord, *, first_frame_s: float | None) -> None:
         say(_sticks(record.mavlink))
     for verdict in record.verdicts:
         mark, style = ("held  ", None) if verdict.held else ("FAILED", "bold red")
-        say(f"  {mark} {verdict.name}{_measured(verdict.value, verdict.limit)}", style=style)
-    say(f"History {record.history_sha256}")
+        say(f"  {mark} {verdict.name}{_measured(verdict)}", style=style)
+    say(f"History SHA-256 {record.history_sha256}")
 
 
 def _sticks(mavlink: Mapping[str, Any]) -> str:
@@ -254,9 +254,20 @@ def _print_metrics(summary: dict[str, Any]) -> None:
         say(f"{name:9} {result:25} {details}".rstrip())
 
 
-def _measured(value: float | bool | None, limit: float | bool | list[float]) -> str:
+def _measured(verdict: Verdict) -> str:
+    """What was measured and allowed, with its unit; one part in ten thousand of the limit is as good as nothing."""
+    from scenarios.metrics import metric_unit
+
+    value, limit = verdict.value, verdict.limit
     if isinstance(value, bool) or isinstance(limit, bool):
         return ""
-    shown = "no value" if value is None else f"{value:.4g}"
-    allowed = f"{limit[0]:g} to {limit[1]:g}" if isinstance(limit, list) else f"limit {limit:g}"
+    unit = f" {metric_unit(verdict.metric)}".rstrip()
+    largest = max(map(abs, limit)) if isinstance(limit, list) else abs(limit)
+    if value is None:
+        shown = "no value"
+    elif abs(value) < 1e-4 * largest:
+        shown = f"0.000{unit}"
+    else:
+        shown = f"{value:.4g}{unit}"
+    allowed = f"{limit[0]:g} to {limit[1]:g}{unit}" if isinstance(limit, list) else f"limit {limit:g}{unit}"
     return f": {shown} ({allowed})"

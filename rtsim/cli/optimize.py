@@ -220,6 +220,7 @@ def _save(
             for point in result.front
         ]
     if check:
+        console.print("Flying the winner on the nonlinear model; the first such flight compiles it (up to 60 s).")
         checked = nonlinear_check(problem, path)
         summary["nonlinear_check"] = figures_summary(checked)
     return summary
@@ -232,9 +233,13 @@ def _points(path: ConversionPath) -> list[dict[str, float]]:
 def _print(summary: dict[str, Any]) -> None:
     from rich.table import Table
 
+    from rtsim.optimization.figures import OBJECTIVES
+
     best = summary["best"]
-    table = Table(title=f"{summary['name']}: {best['objective']}")
-    for column in ("path", best["objective"], "within limits", "duration [s]"):
+    words = OBJECTIVES[best["objective"]]
+    unit = words[words.index("[") :] if "[" in words else ""
+    table = Table(title=f"{summary['name']}: {words}")
+    for column in ("path", f"{best['objective']} {unit}".strip(), "within limits", "duration [s]"):
         table.add_column(column, justify="left" if column == "path" else "right")
     rows = [("best found", best), *summary["baseline"].items()]
     for name, row in rows:
@@ -244,9 +249,10 @@ def _print(summary: dict[str, Any]) -> None:
     results.print(f"{summary['evaluations']} candidates in {summary['generations']} generations, {pace:.1f} s each.")
     if "nonlinear_check" in summary:
         flown = summary["nonlinear_check"]
-        words = "completes" if flown["completed"] else "DOES NOT complete"
+        ending = "completes" if flown["completed"] else "DOES NOT complete"
+        value = f"{flown['objectives'][best['objective']]:.4g} {unit.strip('[]')}".strip()
         results.print(
-            f"The nonlinear model {words} it: {best['objective']} {flown['objectives'][best['objective']]:.4g}, "
+            f"The nonlinear model {ending} it: {best['objective']} {value}, "
             f"altitude within {flown['altitude_deviation_m']:.1f} m."
         )
     results.print(f"Wrote {summary['scenario_file']}; fly it with: rtsim fly {summary['scenario_file']}")

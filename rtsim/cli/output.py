@@ -36,7 +36,8 @@ class _LazyConsole:
             from rich.console import Console
 
             self._stream = stream
-            self._console = Console(file=stream, highlight=False)
+            # Without markup: a unit in brackets, "[kn]", is text, not a style.
+            self._console = Console(file=stream, highlight=False, markup=False)
         return self._console
 
     def __getattr__(self, name: str) -> Any:

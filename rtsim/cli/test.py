@@ -168,16 +168,17 @@ def _bundles(cases: list[Case], out: Path | None) -> dict[str, str]:
 
 def _print(cases: list[Case]) -> None:
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table()
-    for heading in ("scenario", "kind", "law", "verdict", "deepest kn", "off kn"):
+    table = Table(caption="kn outside the corridor at the deepest, with the law and without", caption_justify="left")
+    for heading in ("scenario", "kind", "law", "verdict", "with [kn]", "off [kn]"):
         table.add_column(heading, overflow="fold", no_wrap=heading in {"scenario", "kind"})
     for case in cases:
         table.add_row(
             case.name,
             case.kind,
             case.law,
-            {"passed": "[green]passed[/]", "failed": "[red]FAILED[/]", "error": "[red]ERROR[/]"}[case.verdict],
+            Text(*{"passed": ("passed", "green"), "failed": ("FAILED", "red"), "error": ("ERROR", "red")}[case.verdict]),
             *(f"{values['depth_kt']:.1f}" if values else "" for values in (case.metrics, case.off_metrics)),
         )
     results.print(table)

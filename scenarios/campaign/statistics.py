@@ -100,6 +100,20 @@ def upper_bound(count: int, total: int, *, confidence: float = CONFIDENCE) -> fl
     return _upper(count, total, 1.0 - confidence)
 
 
+def flights_to_bound(limit: float, *, confidence: float = CONFIDENCE) -> int:
+    """Least number of flights, none of them a success, whose upper bound is within a limit.
+
+    Args:
+        limit: Largest allowed upper bound.
+        confidence: Confidence of the bound.
+    """
+    if limit >= 1.0:
+        return 0
+    if limit <= 0.0:
+        raise ValueError("no number of flights bounds a share by 0")
+    return math.ceil(math.log1p(-confidence) / math.log1p(-limit) - 1e-9)
+
+
 def mcnemar(first: FloatArray, second: FloatArray) -> PairedComparison:
     """Compare two laws on the same flights by the exact McNemar test.
 

@@ -12,7 +12,7 @@ import numpy as np
 from rtsim.frame import FloatArray
 from scenarios.campaign.chunks import LawVariant
 from scenarios.campaign.spec import CampaignFile, ExpectRate
-from scenarios.campaign.statistics import Rate, bound_decided, mcnemar, quantile, rate
+from scenarios.campaign.statistics import Rate, bound_decided, flights_to_bound, mcnemar, quantile, rate
 from scenarios.verdict_events import EVENTS
 from scenarios.verdict_metrics import METRIC_PLACE
 
@@ -121,7 +121,9 @@ def _judged(flights: Flights, clause: ExpectRate, *, final: bool) -> Judged:
     verdicts, words = [], []
     if clause.upper_max is not None:
         verdicts.append(bound_decided(count, done, planned, clause.upper_max, confidence=confidence))
-        words.append(f"upper bound <= {clause.upper_max:g}")
+        least_flights = flights_to_bound(clause.upper_max, confidence=confidence) if clause.upper_max > 0.0 else 0
+        impossible = f" (takes at least {least_flights} flights: raise the runs)" if planned < least_flights else ""
+        words.append(f"upper bound <= {clause.upper_max:g}{impossible}")
     if clause.rate_max is not None:
         most = math.floor(clause.rate_max * planned + 1e-9)
         verdicts.append(False if count > most else True if count + planned - done <= most else None)

@@ -137,9 +137,14 @@ def test_closed_loop_is_sampled_as_flown(capsys, outer_loop):
 
 def test_people_get_tables(capsys):
     assert run(["trim", *at(100, 75)]) == 0
-    assert "flapping_deg" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "cyclic flapping" in told
+    assert "in lb" in told
     assert run(["linearize", *at(100, 75), "--closed-loop"]) == 0
-    assert "The loop as flown is stable" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "The loop as flown is stable" in told
+    assert "pitch [rad]" in told
+    assert "and 42 of pilot and outer loops" in told
     assert run(["model", "info"]) == 0
     out = capsys.readouterr().out
     assert "neighbour check" in out

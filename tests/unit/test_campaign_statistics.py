@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from scenarios.campaign.statistics import bound_decided, clopper_pearson, mcnemar, quantile, rate, upper_bound
+from scenarios.campaign.statistics import (
+    bound_decided, clopper_pearson, flights_to_bound, mcnemar, quantile, rate, upper_bound,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(("flights", "bound"), [(59, 0.05), (299, 0.01), (2995, 0.001)])
@@ -78,3 +80,11 @@ def test_stopping_early_never_changes_the_verdict(planned: int, limit: float, sh
     decisions = [bound_decided(int(happened[:n].sum()), n, planned, limit) for n in range(planned + 1)]
     assert decisions[-1] == verdict
     assert all(decision is None or decision == verdict for decision in decisions)
+
+
+@given(limit=st.floats(0.001, 0.9), confidence=st.floats(0.5, 0.99))
+def test_as_many_flights_as_said_bound_a_share(limit: float, confidence: float) -> None:
+    least = flights_to_bound(limit, confidence=confidence)
+    assert upper_bound(0, least, confidence=confidence) <= limit * (1.0 + 1e-6)
+    assert least == 1 or upper_bound(0, least - 1, confidence=confidence) > limit * (1.0 - 1e-6)
+    assert flights_to_bound(0.01) == 299

@@ -99,3 +99,17 @@ def test_a_failed_write_names_the_target_and_leaves_nothing(tmp_path):
     with pytest.raises(OutputError, match=r"out\.csv: cannot be written: No space left"):
         half_write(tmp_path / "out.csv", OSError(28, "No space left on device"))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_unit_in_brackets_is_printed_and_not_taken_for_a_style(capsys):
+    from rich.table import Table
+
+    table = Table()
+    table.add_column("airspeed [kn]")
+    table.add_row("[red] 60")
+    results.print(table)
+    results.print("margin [kn]")
+    told = capsys.readouterr().out
+    assert "airspeed [kn]" in told
+    assert "[red] 60" in told
+    assert "margin [kn]" in told

@@ -11,7 +11,7 @@ import scipy.signal
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.programme import Programme
 from rtsim.units import deg
-from scenarios.metrics import METRIC_NAMES, exceedance_events, flight_metrics, nacelle_reference_deg
+from scenarios.metrics import METRIC_NAMES, exceedance_events, flight_metrics, metric_unit, nacelle_reference_deg
 
 DT = 0.004
 HOLD = Programme.hold(airspeed=0.0, nacelle_angle=deg(90.0), altitude=100.0)
@@ -157,3 +157,11 @@ def test_nacelle_reference_agrees_with_an_integrated_filter() -> None:
     metrics = flight_metrics(rows, programme, DT).nacelle_deg
     assert metrics.max_error == pytest.approx(0.25, abs=1e-8)
     assert metrics.final == pytest.approx(60.25, abs=1e-6)
+
+
+def test_every_metric_has_its_unit() -> None:
+    numbers = {"corridor.exceedances", "controls_on_stop_frames", "lever.rms", "lever.travel"}
+    assert {name for name in METRIC_NAMES if not metric_unit(name)} == numbers
+    assert metric_unit("nacelle_deg.max_rate_deg_s") == "deg/s"
+    assert metric_unit("flapping_deg.peak_after_30_s") == "deg"
+    assert metric_unit("flapping_deg.integral_deg_s") == "deg s"
