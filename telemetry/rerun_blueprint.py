@@ -8,13 +8,22 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from telemetry import rerun_corridor, rerun_instruments
-from telemetry.log_format import LOG_SIGNALS
 from telemetry.rerun_colours import BACKGROUND
-from telemetry.signal_groups import plot_groups, plot_path
+from telemetry.rerun_plots import PILOT_PLOTS
+from telemetry.signal_groups import plot_groups
 from telemetry.view_options import Layout
 
 SHOWN_SECONDS = 30.0
 """Length of the time histories that follow the flight [s]."""
+
+
+ENGINEER_TABS: dict[str, tuple[str, ...]] = {
+    "Controls, rotors and loads": (),
+    "Motion": ("speed", "nacelle", "altitude", "attitude", "position"),
+    "Corridor, protection and air": ("corridor", "protection", "air", "failures"),
+    "Loop health": ("loop",),
+}
+"""Tabs of the engineer's layout and the groups of signals in each; the first takes those that are nowhere else."""
 
 
 def blueprint(layout: Layout) -> Any:
@@ -42,39 +51,34 @@ def blueprint(layout: Layout) -> Any:
 
 def _pilot(*, follow: bool) -> Any:
     """Aircraft, instruments and corridor large; four plots and the events below."""
-    plots = [
-        _plot("Airspeed [kn]", "airspeed_kt", "airspeed_reference_kt", follow=follow),
-        _plot("Nacelle [deg]", "nacelle_deg", "nacelle_reference_deg", follow=follow),
-        _plot("Stick and lever", "stick", "lever", follow=follow),
-        _plot("Flapping [deg]", "flapping_deg", "longitudinal_flapping_deg", follow=follow),
-    ]
+    plots = [_time_series(path, title, follow=follow) for path, (title, _) in PILOT_PLOTS.items()]
     top = rrb.Horizontal(_flight(), _instruments(), _corridor(), column_shares=[4.6, 4.35, 4.35])
     bottom = rrb.Horizontal(
-        rrb.Grid(*plots, grid_columns=4), rrb.Vertical(_modes(follow=follow), _events(), row_shares=[5.2, 4.0]),
-        column_shares=[8.95, 4.35],
-    )  # fmt: skip
+        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), column_shares=[8.1, 2.2, 3.0]
+    )
     return rrb.Vertical(top, bottom, row_shares=[2.0, 1.0])
 
 
 def _engineer(*, follow: bool) -> Any:
-    """Plots of every signal in three tabs beside corridor and aircraft."""
+    """Plots of every signal in tabs of few enough to be read, beside corridor and aircraft."""
     groups = plot_groups()
-    loop = {"loop"}
-    motion = {"speed", "nacelle", "altitude", "attitude", "position"}
+    elsewhere = {group for tab in ENGINEER_TABS.values() for group in tab}
 
-    def grid(name: str, names: set[str] | None) -> Any:
-        chosen = [group for group in groups if _group_of(group.path) in (names or set())]
-        if names is None:
-            chosen = [group for group in groups if _group_of(group.path) not in loop | motion]
-        views = [_time_series(group.path, group.title, follow=follow) for group in chosen]
-        return rrb.Grid(*views, grid_columns=3, name=name)
+    def grid(name: str, names: tuple[str, ...]) -> Any:
+        chosen = [
+            group
+            for group in groups
+            if _group_of(group.path) in names or (not names and _group_of(group.path) not in elsewhere)
+        ]
+        views = [
+            _time_series(group.path, group.title, follow=follow, legend=len(group.columns) > 1) for group in chosen
+        ]
+        return rrb.Grid(*views, grid_columns=2 if len(views) < 7 else 3, name=name)
 
     left = rrb.Vertical(_corridor(), _flight(), _events(), row_shares=[4.0, 3.0, 2.0])
-    tabs = rrb.Tabs(
-        grid("Aircraft, loads and controls", None), grid("Motion", motion), grid("Loop health", loop), active_tab=0
-    )
+    tabs = rrb.Tabs(*(grid(name, names) for name, names in ENGINEER_TABS.items()), active_tab=0)
     return rrb.Horizontal(
-        left, rrb.Vertical(tabs, _modes(follow=follow), row_shares=[6.0, 1.3]), column_shares=[1.0, 2.2]
+        left, rrb.Vertical(tabs, _modes(follow=follow), row_shares=[2.2, 1.0]), column_shares=[1.0, 2.2]
     )
 
 
@@ -120,35 +124,24 @@ def _events() -> Any:
 def _modes(*, follow: bool) -> Any:
     return rrb.StateTimelineView(
         origin="events",
-        contents=["/events/mode", "/events/corridor", "/events/pilot"],
-        name="Mode, corridor, pilot",
-        time_view=_time_axis(60.0) if follow else None,
+        contents=["/events/mode", "/events/corridor", "/events/pilot", "/events/protection"],
+        name="States",
+        time_view=_time_axis(SHOWN_SECONDS) if follow else None,
     )
 
 
-def _plot(title: str, *signal_names: str, follow: bool) -> Any:
-    """Only the named signals of a group."""
-    return _time_series(plot_path(signal_names[0]), title, follow=follow, shown=signal_names)
-
-
-def _time_series(path: str, title: str, *, follow: bool, shown: tuple[str, ...] | None = None) -> Any:
+def _time_series(path: str, title: str, *, follow: bool, legend: bool = True) -> Any:
     """A plot; while the flight goes on, of its last seconds."""
     window = None
     if follow:
         relative = rrb.TimeRangeBoundary.cursor_relative
         window = [rrb.VisibleTimeRange("sim_time", start=relative(seconds=-SHOWN_SECONDS), end=relative())]
-    overrides: dict[Any, Any] | None = None
-    if shown is not None:
-        group = next(group for group in plot_groups() if group.path == path)
-        visible = [LOG_SIGNALS[column].name in shown for column in group.columns]
-        overrides = {path: [rr.SeriesLines(visible_series=visible)]}
     return rrb.TimeSeriesView(
         origin=path,
         name=title,
-        overrides=overrides,
         axis_x=_time_axis(SHOWN_SECONDS) if follow else None,
         time_ranges=window,
-        plot_legend=rrb.PlotLegend(corner="LeftTop"),
+        plot_legend=rrb.PlotLegend(corner="LeftTop", visible=legend),
     )
 
 

@@ -99,8 +99,10 @@ class CorridorPlot:
             art.line([[speed, y], [end, y]], colour, radius=-1.2)
             art.line([[end, y - 3.0], [end, y + 3.0]], colour, radius=-1.4)
             above = y - 9.0 if y > 24.0 else y + 10.0
+            # Between point and boundary if there is room, else beyond the boundary.
+            away = margin + 16.0 if 0.0 <= margin < 36.0 else 17.0
             art.text(
-                f"{margin:+.0f}", speed + direction * 17.0, above, height=8.0, colour=colour, align="centre", weight=1.2
+                f"{margin:+.0f}", speed + direction * away, above, height=8.0, colour=colour, align="centre", weight=1.2
             )
 
 

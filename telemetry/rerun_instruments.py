@@ -13,6 +13,7 @@ import rerun as rr
 
 from rtsim.frame import COLUMN, FloatArray
 from telemetry.rerun_colours import (
+    ACTING,
     AMBER,
     BACKGROUND,
     CYAN,
@@ -220,7 +221,7 @@ def _draw_windows(art: LineArt, row: FloatArray) -> None:
         )
         art.bar(left + 5.0, 68.0, right - 5.0, 82.0, colour=BACKGROUND)
         art.text(rate, 0.5 * (left + right), 75.0, height=6.5, colour=TEXT, align="centre")
-    art.bar(-24.0, _TOP + 3.0, 24.0, _TOP + 15.0, colour=BACKGROUND)
+    art.bar(-40.0, _TOP + 3.0, 40.0, _TOP + 15.0, colour=BACKGROUND)  # as wide as the ladder, whose numbers it hides
     art.text(f"pitch {row[COLUMN.pitch_deg]:+.1f}", 0.0, _TOP + 9.0, height=6.0, colour=WHITE, align="centre")
 
 
@@ -260,13 +261,13 @@ def _draw_numerals(art: LineArt, row: FloatArray) -> None:
 
 
 def _draw_controls(art: LineArt, row: FloatArray) -> None:
-    """Stick and lever as bars between their stops."""
-    for y, name, value, low, high in (
-        (194.0, "stick", float(row[COLUMN.stick]), -1.0, 1.0),
-        (212.0, "lever", float(row[COLUMN.lever]), 0.0, 1.0),
+    """Stick and lever as bars between their stops; what the hands ask for where protection gives something else."""
+    for y, name, value, asked, reason, low, high in (
+        (194.0, "stick", row[COLUMN.stick], row[COLUMN.pilot_stick], row[COLUMN.protection_stick_reason], -1.0, 1.0),
+        (212.0, "lever", row[COLUMN.lever], row[COLUMN.pilot_lever], row[COLUMN.protection_lever_reason], 0.0, 1.0),
     ):
-        left, right = 62.0, _TAPE_EDGE
-        art.text(name, 20.0, y, height=6.5, colour=DIM)
+        left, right = 78.0, _TAPE_EDGE
+        art.text(f"{name} prot" if reason else name, 10.0, y, height=6.5, colour=ACTING if reason else DIM)
         art.box(left, y - 5.0, right, y + 5.0, colour=FRAME)
         zero = left + (right - left) * (0.0 - low) / (high - low)
         place = left + (right - left) * (min(max(value, low), high) - low) / (high - low)
@@ -274,6 +275,10 @@ def _draw_controls(art: LineArt, row: FloatArray) -> None:
         if abs(place - zero) > 0.1:
             art.line([[zero, y], [place, y]], RED if stopped else GREEN, radius=2.2)
         art.line([[place, y - 5.0], [place, y + 5.0]], WHITE, radius=-1.5)
+        if reason:
+            hands = left + (right - left) * (min(max(asked, low), high) - low) / (high - low)
+            art.line([[place, y], [hands, y]], ACTING, radius=1.0)
+            art.line([[hands, y - 7.0], [hands, y + 7.0]], ACTING, radius=-1.5)
 
 
 def _direction(angle_deg: float) -> FloatArray:

@@ -19,10 +19,26 @@ LEVEL_NAMES = ("CLEAR", "CAUTION", "WARNING", "EXCEEDANCE")
 """States of the corridor line."""
 PILOT_NAMES = ("MOCM", "EXTERNAL", "HOLD")
 """States of the pilot line, by ``pilot_mode``."""
+ACTING_NAMES = (
+    "NOT ACTING", "ON STICK", "ON LEVER", "ON STICK, LEVER",
+    "ON NACELLES", "ON STICK, NACELLES", "ON LEVER, NACELLES", "ON ALL",
+)  # fmt: skip
+"""States of the protection line, by the sum of 1 for the stick, 2 for the lever and 4 for the nacelles."""
+_REASONS = (COLUMN.protection_stick_reason, COLUMN.protection_lever_reason, COLUMN.protection_nacelle_reason)
 HELICOPTER_FROM_DEG = 85.0
 """At and above this nacelle angle the aircraft flies as a helicopter [deg]."""
 EVENT_LEVELS = {"info": "INFO", "caution": "WARN", "warning": "ERROR", "exceedance": "CRITICAL"}
 """Rerun's level for each level of an event."""
+
+
+PILOT_PLOTS = {
+    "plots/pilot/airspeed": ("Airspeed", {"flown [kn]": "airspeed_kt", "reference [kn]": "airspeed_reference_kt"}),
+    "plots/pilot/nacelle": ("Nacelle", {"flown [deg]": "nacelle_deg", "reference [deg]": "nacelle_reference_deg"}),
+    "plots/pilot/controls": ("Controls", {"stick, -1 to 1": "stick", "lever, 0 to 1": "lever"}),
+    "plots/pilot/flapping": ("Flapping", {"size [deg]": "flapping_deg", "fore-aft [deg]": "longitudinal_flapping_deg"}),
+}
+"""The pilot's plots: title, short enough for a small screen, and the signals by their name in the legend. They repeat
+signals of the groups, because a small plot has room for two names, and a legend lists every line of its entity."""
 
 
 class Plots:
@@ -38,13 +54,20 @@ class Plots:
         self._groups = plot_groups()
         self._states: dict[str, str] = {}
         for group in self._groups:
-            names = [label(LOG_SIGNALS[column].name) for column in group.columns]
+            names = [label(LOG_SIGNALS[column].name, unit=False) for column in group.columns]
             colours = [SERIES[index % len(SERIES)] for index in range(len(names))]
             recording.log(group.path, rr.SeriesLines(names=names, colors=colours, widths=[1.6]), static=True)
+        self._pilot_plots = {
+            path: [getattr(COLUMN, name) for name in lines.values()] for path, (_, lines) in PILOT_PLOTS.items()
+        }
+        for path, (_, lines) in PILOT_PLOTS.items():
+            lines_of = rr.SeriesLines(names=list(lines), colors=list(SERIES[: len(lines)]), widths=[1.6])
+            recording.log(path, lines_of, static=True)
         for path, states, state_colours in (
             ("events/mode", MODE_NAMES, ((59, 130, 196), (201, 138, 43), (76, 159, 112))),
             ("events/corridor", LEVEL_NAMES, ((47, 125, 79), (224, 176, 48), (240, 128, 48), (224, 72, 72))),
             ("events/pilot", PILOT_NAMES, ((91, 107, 140), (140, 91, 134), (119, 119, 119))),
+            ("events/protection", ACTING_NAMES, ((52, 58, 68), *[(150, 70, 170)] * 7)),
         ):
             configuration = rr.StateConfiguration(values=states, labels=states, colors=state_colours)
             recording.log(path, configuration, static=True)
@@ -61,11 +84,11 @@ class Plots:
             rr.TimeColumn("sim_time", duration=rows[:, COLUMN.time_s]),
             rr.TimeColumn("step", sequence=rows[:, COLUMN.frame].astype(np.int64)),
         ]
-        for group in self._groups:
-            width = len(group.columns)
-            values = np.ascontiguousarray(rows[:, group.columns]).reshape(-1)
-            columns = rr.Scalars.columns(scalars=values).partition([width] * len(rows))
-            self._recording.send_columns(group.path, indexes=times, columns=columns)
+        plots = {group.path: list(group.columns) for group in self._groups} | self._pilot_plots
+        for path, shown in plots.items():
+            values = np.ascontiguousarray(rows[:, shown]).reshape(-1)
+            columns = rr.Scalars.columns(scalars=values).partition([len(shown)] * len(rows))
+            self._recording.send_columns(path, indexes=times, columns=columns)
 
     def update_states(self, rows: FloatArray) -> None:
         """Log every change of mode, corridor level and pilot, at the frame in which it happened.
@@ -81,6 +104,7 @@ class Plots:
                 rows[:, COLUMN.nacelle_deg] >= HELICOPTER_FROM_DEG,
                 rows[:, COLUMN.corridor_level],
                 rows[:, COLUMN.pilot_mode],
+                *(rows[:, column] != 0.0 for column in _REASONS),
             ],
             axis=1,
         )
@@ -105,6 +129,7 @@ class Plots:
             "mode": mode,
             "corridor": LEVEL_NAMES[level_of(row)],
             "pilot": PILOT_NAMES[pilot] if 0 <= pilot < len(PILOT_NAMES) else PILOT_NAMES[1],
+            "protection": ACTING_NAMES[acting_on(row)],
         }
         for name, state in now.items():
             before = self._states.get(name)
@@ -116,6 +141,15 @@ class Plots:
             if name == "mode" and before is not None:
                 # The other two are events of the flight itself, which tells them with its own words.
                 self.event(f"Mode: {state.lower()}", "info")
+
+
+def acting_on(row: FloatArray) -> int:
+    """What the protection law changes in a row: 1 the stick, 2 the lever, 4 the nacelles, or their sum.
+
+    Args:
+        row: A frame's signals.
+    """
+    return sum(1 << place for place, column in enumerate(_REASONS) if row[column])
 
 
 def set_row_time(recording: Any, row: FloatArray) -> None:

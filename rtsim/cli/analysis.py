@@ -173,7 +173,7 @@ def _print_trim(result: dict[str, Any]) -> None:
         title=f"Trim at {result['airspeed_kt']:g} kn, nacelle {result['nacelle_deg']:g} deg", show_header=False
     )
     for justify in ("left", "right", "left"):
-        table.add_column(justify=justify)  # type: ignore[arg-type]
+        table.add_column(justify=justify)
     for key, words, unit, decimals in _TRIM_ROWS:
         table.add_row(words, f"{round(result[key], decimals) + 0.0:,.{decimals}f}".replace(",", " "), unit)
     results.print(table)

@@ -222,14 +222,30 @@ def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> 
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    axes.fill_betweenx(to_deg(angle), to_kt(low), to_kt(high), color="#2a9d8f", alpha=0.15, label="inside")
-    axes.plot(to_kt(low), to_deg(angle), color="#c1121f", label=f"low side: {corridor.low.kind}")
-    axes.plot(to_kt(high), to_deg(angle), color="#e07a00", label=f"high side: {corridor.high.kind}")
+    axes.fill_betweenx(to_deg(angle), to_kt(low), to_kt(high), color="#2a9d54", alpha=0.12, label="inside")
+    axes.plot(
+        to_kt(low), to_deg(angle), color="#d98a00", linewidth=2.0, label=_wrapped(f"low side: {corridor.low.kind}")
+    )
+    axes.plot(
+        to_kt(high), to_deg(angle), color="#d03c3c", linewidth=2.0, label=_wrapped(f"high side: {corridor.high.kind}")
+    )
     axes.plot(to_kt(np.asarray(corridor.centre_speed(angle))), to_deg(angle), "k--", linewidth=1.0, label="centre line")
     if point is not None:
         axes.plot(point[0], point[1], "o", color="#1d3557", label=f"{point[0]:g} kn, {point[1]:g} deg")
-    axes.set(xlabel="airspeed [kn]", ylabel="nacelle angle [deg]", title=corridor.title, ylim=(-2.0, 97.0))
+    axes.set(
+        xlabel="airspeed [kn]", ylabel="nacelle angle [deg], 90 helicopter", title=corridor.title, ylim=(-2.0, 97.0)
+    )
+    if point is None:
+        downstop = f"downstop: to {to_kt(corridor.downstop_speed):.0f} kn"
+        axes.annotate(downstop, (195.0, 2.0), fontsize="small")
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper right", fontsize="small")
+    axes.legend(loc="lower left", bbox_to_anchor=(0.02, 0.03), fontsize="small")
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=150)
+
+
+def _wrapped(words: str) -> str:
+    """In lines short enough for the corner the legend has."""
+    from textwrap import fill
+
+    return fill(words, 30)

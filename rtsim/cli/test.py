@@ -178,7 +178,9 @@ def _print(cases: list[Case]) -> None:
             case.name,
             case.kind,
             case.law,
-            Text(*{"passed": ("passed", "green"), "failed": ("FAILED", "red"), "error": ("ERROR", "red")}[case.verdict]),
+            Text(
+                *{"passed": ("passed", "green"), "failed": ("FAILED", "red"), "error": ("ERROR", "red")}[case.verdict]
+            ),
             *(f"{values['depth_kt']:.1f}" if values else "" for values in (case.metrics, case.off_metrics)),
         )
     results.print(table)

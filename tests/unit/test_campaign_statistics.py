@@ -11,8 +11,14 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from scenarios.campaign.statistics import (
-    bound_decided, clopper_pearson, flights_to_bound, mcnemar, quantile, rate, upper_bound,
-)  # fmt: skip
+    bound_decided,
+    clopper_pearson,
+    flights_to_bound,
+    mcnemar,
+    quantile,
+    rate,
+    upper_bound,
+)
 
 
 @pytest.mark.parametrize(("flights", "bound"), [(59, 0.05), (299, 0.01), (2995, 0.001)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -11,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT
+from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from telemetry import flight_plots
 from telemetry.corridor_outline import CorridorOutline
 from telemetry.flight_plots import plot_flight
@@ -19,15 +20,18 @@ from telemetry.log_format import FlightMetadata
 from telemetry.log_reader import FlightLog, read_log
 from telemetry.recorder import Recorder
 from telemetry.ring import TIMING_COUNT
+from telemetry.signal_groups import label
 
 OUTLINE = CorridorOutline.from_lines("design", low=([90.0, 0.0], [0.0, 101.0]), high=([90.0, 0.0], [125.0, 170.0]))
 
 
-def record(path: Path, frames: int, *, timed: bool) -> FlightLog:
+def record(path: Path, frames: int, *, timed: bool, change: Callable[[FloatArray], None] | None = None) -> FlightLog:
     rows = np.zeros((frames, SIGNAL_COUNT))
     rows[:, COLUMN.time_s] = np.arange(frames) / 50.0
     rows[:, COLUMN.airspeed_kt] = np.linspace(0.0, 170.0, frames)
     rows[:, COLUMN.nacelle_deg] = np.linspace(90.0, 0.0, frames)
+    if change is not None:
+        change(rows)
     recorder = Recorder(path, FlightMetadata("hover <& more>", "", "h", 0, 50.0, corridor=OUTLINE), live=False)
     for row in rows:
         recorder.push(row, np.full(TIMING_COUNT, 7.0) if timed else None)
@@ -66,10 +70,38 @@ def test_every_signal_is_in_one_of_the_plots_with_its_unit(tmp_path: Path) -> No
     log = record(tmp_path / "flight.parquet", 100, timed=False)
     figure = Figure()
     flight_plots._draw_all_signals(log, figure)
-    shown = {str(line.get_label()).replace(" ", "_") for axes in figure.axes for line in axes.get_lines()}
+    name_of = {label(name, unit=False): name for name in log.names}
+    shown = {name_of[str(line.get_label())] for axes in figure.axes for line in axes.get_lines()}
     states = {"frame", "time_s", "corridor_level", "on_downstop", "control_on_stop", "pilot_mode"}
     assert shown | states == set(log.names[:SIGNAL_COUNT])
-    assert all("[" in axes.get_title(loc="left") for axes in figure.axes if axes.get_visible())
+    for axes in figure.axes:
+        assert "[" in axes.get_title(loc="left") + axes.get_ylabel() or not axes.get_visible()
+
+
+def test_the_controls_are_shaded_while_protection_acts(tmp_path: Path) -> None:
+    def act(rows: FloatArray) -> None:
+        rows[20:30, COLUMN.protection_lever_reason] = rows[90:, COLUMN.protection_lever_reason] = 7.0
+
+    log = record(tmp_path / "flight.parquet", 100, timed=False, change=act)
+    axes = Figure().subplots()
+    flight_plots._shade_protection(axes, log, "protection_stick_reason")
+    assert not axes.patches
+    flight_plots._shade_protection(axes, log, "protection_lever_reason")
+    spans = [(patch.get_x(), patch.get_x() + patch.get_width()) for patch in axes.patches]
+    assert np.allclose(spans, [(0.4, 0.6), (1.8, 1.98)])
+    assert axes.get_legend_handles_labels()[1] == ["protection acts"]
+
+
+def test_marks_that_would_cover_one_another_become_one(tmp_path: Path) -> None:
+    def stop(rows: FloatArray) -> None:
+        for column in (COLUMN.airspeed_kt, COLUMN.nacelle_deg):
+            rows[200:, column] = rows[200, column]
+
+    log = record(tmp_path / "flight.parquet", 400, timed=False, change=stop)
+    figure = Figure()
+    flight_plots._draw_corridor(log, figure)
+    told = [text.get_text() for text in figure.axes[0].texts]
+    assert told == ["0 s", "1 s", "2 s", "3 s", "4 to 7 s"]
 
 
 def test_an_unpaced_flight_has_no_timing_picture(tmp_path: Path) -> None:

@@ -9,10 +9,11 @@ import rerun as rr
 from rtsim.frame import COLUMN, SIGNAL_COUNT, SIGNAL_NAMES
 from telemetry import rerun_airframe as airframe
 from telemetry import rerun_corridor
-from telemetry.log_format import LOG_NAMES
+from telemetry.log_format import LOG_NAMES, LOG_SIGNALS
 from telemetry.rerun_blueprint import blueprint
+from telemetry.rerun_plots import ACTING_NAMES, PILOT_PLOTS, acting_on
 from telemetry.rerun_strokes import LineArt, text_width
-from telemetry.signal_groups import FLAGS, plot_groups, plot_path
+from telemetry.signal_groups import FLAGS, label, plot_groups, plot_path
 
 PARTS = {
     "fuselage": airframe.fuselage(),
@@ -87,10 +88,33 @@ def test_layouts_name_only_entities_that_are_logged(layout: str) -> None:
     views = list(_views(blueprint(layout).root_container))
     origins = {str(view.origin).strip("/") for view in views}
     known = {"world/chase", "instruments", "corridor", "events", "events/log"} | {group.path for group in plot_groups()}
+    known |= set(PILOT_PLOTS)
     assert origins <= known
     assert {"world/chase", "corridor", "events", "events/log"} <= origins
     if layout == "engineer":
         assert {group.path for group in plot_groups()} <= origins, "the engineer sees every signal"
+
+
+def test_a_plot_says_its_unit_once() -> None:
+    titles = {group.path: group.title for group in plot_groups()}
+    assert titles[plot_path("mast_torque_inlb")] == "Mast torque [in lb]"
+    assert titles[plot_path("stick")] == "Stick and lever [-]"
+    assert plot_path("protection_stick") != plot_path("protection_stick_reason"), "a number of a limit is no share"
+    for signal in LOG_SIGNALS:
+        if signal.unit and signal.name not in FLAGS:
+            shown = label(signal.name, unit=False)
+            assert shown != label(signal.name), f"{signal.name} would show its unit twice"
+            assert shown.split(), signal.name
+    assert label("airspeed_kt", unit=False) == "airspeed"
+
+
+def test_the_view_says_on_what_protection_acts() -> None:
+    row = np.zeros(SIGNAL_COUNT)
+    assert ACTING_NAMES[acting_on(row)] == "NOT ACTING"
+    row[COLUMN.protection_lever_reason] = 7.0
+    assert ACTING_NAMES[acting_on(row)] == "ON LEVER"
+    row[COLUMN.protection_nacelle_reason] = 1.0
+    assert ACTING_NAMES[acting_on(row)] == "ON LEVER, NACELLES"
 
 
 def _views(part: object) -> list[object]:
