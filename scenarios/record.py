@@ -62,6 +62,13 @@ class FlightRecord(Mapping[str, FloatArray]):
     failure: OutputError | None = None
     """The log or view that failed while the flight went on; None where all was well."""
 
+    def __repr__(self) -> str:
+        """Say what was flown and how it ended; the numbers would be pages."""
+        return (
+            f"<FlightRecord {self.scenario.name}: {len(self.rows)} frames at {self.scenario.rate_hz} Hz, "
+            f"{self.end_reason}; flight['airspeed_kt'], .metrics, .verdicts, .events>"
+        )
+
     def __getitem__(self, name: str) -> FloatArray:
         """One signal over the flight, shape (frames,).
 

@@ -25,6 +25,7 @@ COLD_START_S = 3.0
 """A start that takes longer than this is explained [s]."""
 MAX_EVENT_LINES = 40
 """Events told while flying; a flight along a boundary has more than anyone reads."""
+_CONTROLS = (("stick", "stick_s"), ("lever", "lever_s"), ("nacelles", "nacelles_s"))
 _STYLES = {"caution": "yellow", "warning": "bold yellow", "exceedance": "bold red"}
 
 
@@ -252,6 +253,11 @@ def _print_metrics(summary: dict[str, Any]) -> None:
     )
     for name, result, details in rows:
         say(f"{name:9} {result:25} {details}".rstrip())
+    acted = summary.get("interventions", {})
+    if acted.get("episodes"):
+        times = "acted" if acted["episodes"] == 1 else f"acted {acted['episodes']} times"
+        on = [f"{name} {acted[key]:.1f} s" for name, key in _CONTROLS if acted[key]]
+        say(f"Protection {times}: {', '.join(on)}")
 
 
 def _measured(verdict: Verdict) -> str:

@@ -39,41 +39,88 @@ def register(app: typer.Typer) -> None:
 def fly_command(
     scenario: Annotated[
         str | None,
-        typer.Argument(help="Name of a scenario, or path of a .toml file.", show_default="typical_conversion"),
+        typer.Argument(
+            help="Name of a scenario (typical_conversion, reconversion, hover, manual_flight, ...), or a .toml file.",
+            show_default="typical_conversion",
+        ),
     ] = None,
     *,
-    pilot: Annotated[str | None, typer.Option(help="mocm, mavlink, an installed pilot, or MODULE:CLASS.")] = None,
-    plant: Annotated[Literal["lpv", "lpv-plain", "nonlinear"] | None, typer.Option(help="Model to fly.")] = None,
+    pilot: Annotated[
+        str | None,
+        typer.Option(
+            help="Who flies: mocm (the virtual pilot), mavlink (you), an installed pilot, or MODULE:CLASS.",
+            show_default="the scenario's, mocm",
+        ),
+    ] = None,
+    plant: Annotated[
+        Literal["lpv", "lpv-plain", "nonlinear"] | None,
+        typer.Option(
+            help="Aircraft: the layered LPV model, the paper's plain one, or the nonlinear one.",
+            show_default="the scenario's, lpv",
+        ),
+    ] = None,
     outer_loop: Annotated[
-        Literal["integrators", "pi"] | None, typer.Option(help="How the MOCM holds airspeed and altitude.")
+        Literal["integrators", "pi"] | None,
+        typer.Option(
+            help="How the MOCM holds airspeed and altitude: integrators in its design, or the paper's PI loops.",
+            show_default="the scenario's, integrators",
+        ),
     ] = None,
     protection: Annotated[
-        str | None, typer.Option(help="off, monitor, governor, full, MODULE:CLASS, or several: A,B.")
+        str | None,
+        typer.Option(
+            help="off; monitor: warn; governor: limit the nacelles; full: stick and lever too; MODULE:CLASS; or A,B.",
+            show_default="the scenario's, monitor",
+        ),
     ] = None,
     nacelle: Annotated[
-        str | None, typer.Option(help="Who sets the nacelle rate: programme, automatic or MODULE:CLASS.")
+        str | None,
+        typer.Option(
+            help="Who sets the nacelle rate: programme, automatic (by airspeed) or MODULE:CLASS.",
+            show_default="the scenario's, programme",
+        ),
     ] = None,
-    corridor: Annotated[Literal["design", "flight", "model"] | None, typer.Option(help="Boundaries to watch.")] = None,
-    speed: Annotated[str, typer.Option(help="Multiple of real time, or max.")] = "1",
+    corridor: Annotated[
+        Literal["design", "flight", "model"] | None,
+        typer.Option(
+            help="Boundaries to watch: TM X-62407's chart, the stall line flown (TM 81244), or the model's own trims.",
+            show_default="the scenario's; design, or flight with a protection that acts",
+        ),
+    ] = None,
+    speed: Annotated[str, typer.Option(help="Multiple of real time, or max: headless, as fast as it goes.")] = "1",
     rate: Annotated[int | None, typer.Option(help="Frames per second [Hz].", show_default="250")] = None,
     seed: Annotated[int | None, typer.Option(help="Root of every random stream.", show_default="0")] = None,
-    duration: Annotated[float | None, typer.Option(help="Length of the flight [s].")] = None,
-    start: Annotated[Literal["hover", "conversion", "cruise"] | None, typer.Option(help="Where to start.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="End after so many seconds [s].", show_default="the scenario's")
+    ] = None,
+    start: Annotated[
+        Literal["hover", "conversion", "cruise"] | None,
+        typer.Option(
+            help="Where to start: 0 kn at 90 deg, 80 kn at 75 deg, or 170 kn at 0 deg.",
+            show_default="the programme's first point",
+        ),
+    ] = None,
     airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed at the start [kn].")] = None,
     nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle at the start [deg], 90 helicopter.")] = None,
     altitude_m: Annotated[float | None, typer.Option(help="Altitude at the start [m].")] = None,
-    wind_kt: Annotated[float | None, typer.Option(help="Steady tailwind [kn].")] = None,
+    wind_kt: Annotated[float | None, typer.Option(help="Steady tailwind [kn]; negative is a headwind.")] = None,
     turbulence: Annotated[
         Literal["none", "light", "moderate", "severe"] | None, typer.Option(help="Dryden turbulence (MIL-F-8785C).")
     ] = None,
-    pilot_noise: Annotated[bool | None, typer.Option(help="Let the MOCM's noise act.")] = None,
+    pilot_noise: Annotated[bool | None, typer.Option(help="Let the MOCM's observation and motor noise act.")] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Open no viewer.")] = False,
     record: Annotated[Path | None, typer.Option(help="Write the Rerun view into FILE.rrd.")] = None,
-    layout: Annotated[Literal["pilot", "engineer"], typer.Option(help="Layout of the viewer.")] = "pilot",
+    layout: Annotated[
+        Literal["pilot", "engineer"],
+        typer.Option(help="Layout of the viewer: instruments large, or plots of every signal."),
+    ] = "pilot",
     log: Annotated[Path | None, typer.Option(help="Write the flight log PATH.parquet (a directory).")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier log at that path.")] = False,
     mavlink: Annotated[
-        list[str] | None, typer.Option(help="Send MAVLink to HOST:PORT, repeatable.", show_default="127.0.0.1:14550")
+        list[str] | None,
+        typer.Option(
+            help="Send MAVLink to HOST:PORT, repeatable.", show_default="none; 127.0.0.1:14550 with --pilot mavlink"
+        ),
     ] = None,
     mavlink_bind: Annotated[
         str | None, typer.Option(help="Receive MAVLink on HOST:PORT.", show_default="a free port")

@@ -255,6 +255,7 @@ class LpvAircraft:
 
     def _require_inside(self, airspeed: float, nacelle: float) -> None:
         d = self.database
+        degrees = f"angles are in radians: write nacelle=deg({nacelle:g}) with rtsim.units.deg"
         for name, value, axis, shown, unit in (
             ("airspeed", airspeed, d.airspeed, to_kt, "kn"),
             ("nacelle", nacelle, d.nacelle, to_deg, "deg"),
@@ -266,6 +267,7 @@ class LpvAircraft:
                     key=name,
                     value=f"{shown(value):g} {unit}",
                     allowed=f"{shown(axis[0]):g} to {shown(axis[-1]):g} {unit}",
+                    mend=degrees if name == "nacelle" and abs(value) > 2.0 * np.pi else None,
                 )
 
 

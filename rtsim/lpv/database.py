@@ -82,6 +82,15 @@ class Database:
     """Pilot gains by name of the design."""
     _hash: str = field(default="", init=False, repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        """Say what it is; the numbers would be pages."""
+        title = self.attributes.get("title", "untitled")
+        layers, speeds, angles = len(self.layer_acceleration), len(self.airspeed), len(self.nacelle)
+        return (
+            f"<Database {title!r}: {layers} layers x {speeds} airspeeds x {angles} nacelle angles, "
+            f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs>"
+        )
+
     def __post_init__(self) -> None:
         """Make every array read-only, contiguous float64 and check shapes and axes."""
         for item in fields(self):

@@ -145,7 +145,11 @@ def checked_speed(speed: float) -> float:
         The speed.
     """
     low, high = SPEED_RANGE
-    if not (low <= speed <= high or speed == math.inf):
+    try:
+        number = float(speed)
+    except (TypeError, ValueError):  # from Python, where nothing but a type checker would tell
+        number = math.nan
+    if not (low <= number <= high or number == math.inf):
         raise InputError(
             "is out of range",
             key="--speed",
@@ -153,7 +157,7 @@ def checked_speed(speed: float) -> float:
             allowed=f"{low:g} to {high:g} times real time, or max",
             mend="choose a value in this range",
         )
-    return speed
+    return number
 
 
 def neighbouring_warp(speed: float, *, upwards: bool) -> float:
