@@ -129,7 +129,8 @@ class FlightRecord(Mapping[str, FloatArray]):
         result.update(self.watched)
         if self.mavlink is not None:
             result["mavlink"] = dict(self.mavlink)
-        result["expectations"] = [asdict(verdict) for verdict in self.verdicts]
+        promised = ("name", "held", "value", "limit")
+        result["expectations"] = [{key: getattr(verdict, key) for key in promised} for verdict in self.verdicts]
         return result
 
 

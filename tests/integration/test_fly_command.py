@@ -90,7 +90,7 @@ def test_a_failed_expectation_is_exit_1(tmp_path: Path, capsys: pytest.CaptureFi
     output = capsys.readouterr()
     expectations = json.loads(output.out)["expectations"]
     assert expectations[1] == {"name": "is at 200 m", "held": False, "value": pytest.approx(100.0), "limit": 200.0}
-    assert "FAILED is at 200 m: 100 (limit 200)" in output.err
+    assert "FAILED is at 200 m: 100 m (limit 200 m)" in output.err
 
 
 @pytest.mark.parametrize(
