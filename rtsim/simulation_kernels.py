@@ -101,7 +101,8 @@ class SimulationTables(NamedTuple):
     pilot: PilotTables
     """The MOCM's gains and references."""
     aids: AidTables
-    """Schedules of the pilot aids; they act on every pilot but the MOCM, which is designed for the bare aircraft."""
+    """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
+    bare aircraft, nor on controls that are held."""
     gusts: GustTables
     """Parameters of gusts and turbulence."""
     faults: FaultTables
@@ -384,7 +385,8 @@ def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, ap
     acting = scratch.command
     scratch.hands[0] = min(max(applied[0], -1.0), 1.0)
     scratch.hands[1] = min(max(applied[1], 0.0), 1.0)
-    if state.clock[CLOCK_MODE] == MODE_MOCM:
+    if state.clock[CLOCK_MODE] != MODE_EXTERNAL:
+        # Held controls are what acted last, aids included: a second helping would run them away.
         acting[0], acting[1] = scratch.hands[0], scratch.hands[1]
         # Whoever takes over later finds the aids to be engaged anew.
         state.aids[LAST_SWITCHES] = -1.0

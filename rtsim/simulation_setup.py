@@ -73,7 +73,7 @@ class FlightSetup:
     pilot_noise: bool = False
     """Let the MOCM's observation and motor noise act."""
     aids: tuple[AidName, ...] = ()
-    """Pilot aids on at frame 0; they act on every pilot but the MOCM."""
+    """Pilot aids on at frame 0; they act on hands and plug-ins, not on the MOCM and not on held controls."""
     air: AirSpecification = CALM
     """Gusts and turbulence."""
     faults: tuple[Fault, ...] = ()

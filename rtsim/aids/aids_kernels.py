@@ -223,7 +223,7 @@ def aids_step(
         switches: Which are on, shape (AID_COUNT,).
         x: Aircraft state.
         nacelle: Nacelle angle [rad].
-        hands: Stick and lever after protection.
+        hands: Stick and lever as the pilot holds them.
         acting: In: stick and lever that acted last; out: those that act now.
         dt: Length of the frame [s].
     """

@@ -125,6 +125,29 @@ def test_hands_off_the_mocm() -> None:
     assert row[COLUMN.lever] == pytest.approx(hands.lever, abs=0.01)
 
 
+@pytest.mark.parametrize(("airspeed", "nacelle"), [(0.0, 90.0), (60.0, 75.0), (130.0, 25.0)])
+def test_held_controls_stay_and_come_back_without_a_step(airspeed: float, nacelle: float) -> None:
+    """Hands to held and back with aids at work: held controls stand still, no hand-over moves one by 1 % (issue 3)."""
+    simulation = Simulation(setup(airspeed, nacelle))
+    for name in ("rate_damping", "attitude_retention", "trim_bias"):
+        simulation.set_aid(name, True)  # type: ignore[arg-type]
+    lever = float(simulation._state.u[1])
+    hands = Command(0.25, lever - 0.1, 0.0)
+    for _ in range(50):
+        before = simulation.step(hands)
+    simulation.set_pilot("hold")
+    for _ in range(100):
+        held = simulation.step()
+        assert held[COLUMN.stick] == before[COLUMN.stick]
+        assert held[COLUMN.lever] == before[COLUMN.lever]
+    simulation.set_pilot("external")
+    for _ in range(250):
+        back = simulation.step(hands)
+        assert abs(back[COLUMN.stick] - held[COLUMN.stick]) < 0.02
+        assert abs(back[COLUMN.lever] - held[COLUMN.lever]) < 0.01
+        held = back
+
+
 def test_an_unknown_aid_is_refused() -> None:
     """A wrong name gets the choices."""
     with pytest.raises(InputError, match="rate_damping"):
