@@ -141,6 +141,7 @@ class StickHandler:
         self._lever = _Fade(acting.lever, LEVER_FADE_RATE)
         self._stick = _Fade(0.0, STICK_FADE_RATE)
         self._stick_held = self._lever_held = True
+        self._stop_nacelles()  # what was asked of them before another pilot flew is over
         self.state = INPUT_NONE if self.state == INPUT_NONE else INPUT_LIVE
 
     def go_to(self, angle: float) -> None:
@@ -204,9 +205,12 @@ class StickHandler:
             self.state = INPUT_LIVE
         elif self.state == INPUT_LIVE:
             self.state = INPUT_LOST
-            # The nacelles stop where they are, whoever set them moving.
-            self._target, self.transition = math.nan, 0
-            self._switch.state[:] = 0.0
+            self._stop_nacelles()
+
+    def _stop_nacelles(self) -> None:
+        """The nacelles stop where they are, whoever set them moving."""
+        self._target, self.transition = math.nan, 0
+        self._switch.state[:] = 0.0
 
     def _nacelle_rate(self, sticks: StickInput, *, fresh: bool, situation: StickSituation, dt: float) -> float:
         """Rate of the command angle: the switch first, then an angle to go to, then a conversion [rad/s]."""

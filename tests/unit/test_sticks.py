@@ -221,6 +221,21 @@ def test_taking_over_follows_live_sticks_at_once_and_keeps_the_lever_otherwise()
     assert fly(idle, StickInput(), frames=1, age=math.inf)[0][0].lever == 0.7
 
 
+def test_taking_over_again_does_not_go_on_with_what_was_asked_before():
+    """A conversion, an angle or a run to a detent ends when another pilot flies."""
+    converting = handler(schedule=transition_schedule(load_corridor("design")))
+    converting.start_transition(TO_AIRPLANE)
+    going = handler()
+    going.go_to(deg(60.0))
+    running = handler(StickSettings(detents=True))
+    below = StickSituation(airspeed=kt(80.0), nacelle_command=deg(70.0))
+    fly(running, LIVE._replace(nacelle_switch=-1), frames=10, situation=below)
+    for hands, situation in ((converting, HELICOPTER), (going, HELICOPTER), (running, below)):
+        assert fly(hands, LIVE, frames=5, situation=situation)[0][-1].nacelle_rate < 0.0
+        hands.engage(Command(0.1, 0.6, 0.0))
+        assert all(command.nacelle_rate == 0.0 for command in fly(hands, LIVE, frames=50, situation=situation)[0])
+
+
 @given(st.floats(0.0, 0.3), st.floats(0.0, 1.0), st.floats(0.1, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_shape_is_odd_monotonic_and_reaches_full_travel(dead_band, expo, scale, first, second):
     settings = StickSettings(dead_band=dead_band, expo=expo, scale=scale)
