@@ -25,7 +25,10 @@ ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 """MAV_RESULT."""
 ARM, SET_MODE, TRANSITION, SET_ACTUATOR, REBOOT, STORAGE = 400, 176, 3000, 187, 246, 245
 REQUEST_MESSAGE, SET_INTERVAL, GET_INTERVAL, CAPABILITIES = 512, 511, 510, 520
+LONGEST_INTERVAL_US = 2.0**31 - 128.0
+"""Longest interval that MESSAGE_INTERVAL can state and a float32 can carry [us]."""
 _FORCE = 21196.0
+_NOT_GIVEN = 2**31 - 1
 
 
 class CommandContext(NamedTuple):
@@ -37,6 +40,20 @@ class CommandContext(NamedTuple):
     """Where it came from."""
     now: float
     """Monotonic time [s]."""
+
+
+def command_values(message: Any) -> list[float]:
+    """The seven parameters of a COMMAND_LONG or COMMAND_INT; NaN where the sender left one open.
+
+    Args:
+        message: The command.
+    """
+    values = [message.param1, message.param2, message.param3, message.param4]
+    if message.get_msgId() == dialect.MAVLINK_MSG_ID_COMMAND_LONG:
+        values += [message.param5, message.param6, message.param7]
+    else:  # whole numbers have no NaN: the largest one stands for it
+        values += [math.nan if place == _NOT_GIVEN else place for place in (message.x, message.y)] + [message.z]
+    return [float(value) for value in values]
 
 
 class Answer(NamedTuple):
@@ -211,7 +228,7 @@ class CommandHandler:
     def _set_interval(self, context: CommandContext) -> Answer:
         number = _integer(context.values[0], 0, 0xFFFFFF)
         interval = context.values[1]
-        if number is None or not math.isfinite(interval) or (interval < 0.0 and interval != -1.0):
+        if number is None or not (interval == -1.0 or 0.0 <= interval <= LONGEST_INTERVAL_US):
             return Answer(DENIED)
         if number == ids.HEARTBEAT:
             return Answer(DENIED)  # the link lives by it

@@ -139,6 +139,17 @@ class StickReader:
         """
         return bool(self.sticks.buttons >> self._buttons[function] & 1)
 
+    def forget(self, *, buttons: bool) -> None:
+        """Let every axis count as nobody's until it is heard again.
+
+        Args:
+            buttons: Whether the buttons are forgotten too, so that one held by the next pilot counts as pressed.
+        """
+        old = self.sticks
+        self.sticks = StickInput(
+            sequence=old.sequence, received_ns=old.received_ns, buttons=0 if buttons else old.buttons
+        )
+
     def manual_control(self, message: Any, *, received_ns: int, pilot: PilotId, bipolar: bool) -> list[str]:
         """Take a MANUAL_CONTROL.
 

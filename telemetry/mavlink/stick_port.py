@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from telemetry.mavlink.exchange import ACCEPTED, Request
 from telemetry.mavlink.framing import Frame
 from telemetry.mavlink.notices import INFO, WARNING
-from telemetry.mavlink.parameters import AID_PARAMETERS, LEVER_RANGE, OWNER_TIME
+from telemetry.mavlink.parameters import AID_PARAMETERS, LEVER_RANGE, LOSS_TIME, OWNER_TIME
 from telemetry.mavlink.peers import Peer
 from telemetry.mavlink.pilot_input import PilotId
 
@@ -29,6 +29,7 @@ class StickPort:
         """
         self._vehicle = vehicle
         self._explained = False
+        self._pilot: PilotId | None = None
 
     def take(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int) -> None:
         """Take sticks from whoever holds them.
@@ -52,6 +53,10 @@ class StickPort:
             else:
                 board.say_seldom("whitelist", WARNING, f"System {frame.system_id} may not fly", now)
             return
+        silent = received_ns - vehicle.reader.sticks.received_ns > vehicle.store[LOSS_TIME] * 1e9
+        if silent or pilot != self._pilot:  # what was held before must not come back with the first packet
+            vehicle.reader.forget(buttons=pilot != self._pilot)
+            self._pilot = pilot
         if before != vehicle.lock.owner:
             board.say(INFO, f"Sticks: {pilot}")
         if manual:

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from telemetry.mavlink import messages as ids
-from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler
+from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler, command_values
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
 from telemetry.mavlink.exchange import (
     ARMED,
@@ -126,6 +126,8 @@ class Vehicle:
             if self._signatures is not None and not self._signatures.accepts(frame):
                 continue
             new = address not in self.peers.by_address
+            if new and self._signatures is not None and not frame.signed:
+                continue  # a radio may speak without a key, but that earns no telemetry
             peer = self.peers.learn(address, now)
             if peer is None:
                 break
@@ -161,11 +163,7 @@ class Vehicle:
         return system in {0, self.config.system_id} and component in {0, self.config.component_id}
 
     def _take_command(self, message: Any, frame: Frame, peer: Peer) -> None:
-        if frame.message_id == _COMMAND_LONG:
-            values = [getattr(message, f"param{place}") for place in range(1, 8)]
-        else:
-            values = [message.param1, message.param2, message.param3, message.param4, message.x, message.y, message.z]
-        context = CommandContext([float(value) for value in values], peer, self.now)
+        context = CommandContext(command_values(message), peer, self.now)
         answer = self._commands.answer(message.command, context, system_id=frame.system_id)
         self.reply(
             peer,

@@ -181,11 +181,10 @@ def main() -> int:
     config = MavlinkConfig.from_json(sys.stdin.readline())
     try:
         exchange, ring = Exchange(exchange_name), RingReader(ring_name)
-        sock = open_socket(config)
         try:
-            serve(config, exchange, ring, sock)
+            with open_socket(config) as sock:
+                serve(config, exchange, ring, sock)
         finally:
-            sock.close()
             ring.close()
             exchange.close()
     except RtsimError as failure:

@@ -390,6 +390,9 @@ def test_message_intervals_are_per_station(bench):
         ((0, 1e6), 2),
         ((30, math.nan), 2),
         ((30, -5), 2),
+        ((30, math.inf), 2),
+        ((30, 4e9), 2),
+        ((30, 1e30), 2),
         ((math.nan, 1e5), 2),
         ((7777, 1e5), 3),
         ((1.5, 1), 2),
@@ -422,6 +425,24 @@ def test_command_int_is_the_same(bench):
     bench.send(dialect.MAVLink_command_int_message(1, 1, 0, 400, 0, 0, 1.0, 0, 0, 0, 0, 0, 0))
     assert [ack.result for ack in bench.taken("COMMAND_ACK")] == [0]
     assert bench.vehicle.state.armed
+
+
+def test_the_longest_interval_can_be_asked_for(bench):
+    """MESSAGE_INTERVAL counts microseconds in 32 bits."""
+    assert bench.command(511, 30, 2147483520.0) == 0
+    assert bench.command(510, 30) == 0
+    assert bench.answer[1].interval_us == 2147483520
+
+
+def test_a_command_int_leaves_numbers_open_with_the_largest_one(bench):
+    bench.taken()
+    left_open = 2**31 - 1
+    bench.send(
+        dialect.MAVLink_command_int_message(
+            1, 1, 0, 187, 0, 0, 1.0, math.nan, math.nan, math.nan, left_open, left_open, 0
+        )
+    )
+    assert [ack.result for ack in bench.taken("COMMAND_ACK")] == [0]
 
 
 def test_other_targets_are_met_with_silence(bench):
@@ -649,6 +670,32 @@ def test_the_first_pilot_owns_the_sticks_until_it_is_silent(bench):
     assert bench.exchange.read_sticks().stick == 0.9
 
 
+def test_a_new_pilot_does_not_inherit_axes_or_buttons(bench):
+    bench.send(manual(x=600, z=300, buttons=1 << 9))
+    bench.requests()
+    bench.fly(2.2)
+    channels = dict.fromkeys((f"chan{number}_raw" for number in range(1, 9)), 65535) | {"chan3_raw": 1700}
+    bench.send(dialect.MAVLink_rc_channels_override_message(1, 1, **channels), address=OTHER)
+    sticks = bench.exchange.read_sticks()
+    assert sticks.lever == pytest.approx(0.7)
+    assert not sticks.stick_valid
+    bench.fly(2.2)
+    bench.send(manual(buttons=1 << 9))
+    assert bench.requests() == [Request("pilot", "next")]
+
+
+def test_after_a_loss_an_axis_counts_when_it_is_heard_again(bench):
+    bench.send(manual(x=600, z=300, buttons=1 << 9))
+    bench.requests()
+    bench.fly(1.0)
+    bench.send(manual(x=32767, z=400, buttons=1 << 9))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.stick_valid, sticks.lever_valid, sticks.lever) == (False, True, 0.4)
+    assert bench.requests() == []  # the button never went up
+    bench.send(manual(x=-100, z=400))
+    assert bench.exchange.read_sticks().stick == -0.1
+
+
 def test_only_listed_systems_may_fly_or_change_things(bench):
     bench.send(manual(x=500), system=42, address=OTHER)
     assert bench.exchange.read_sticks().sequence == 0
@@ -740,6 +787,18 @@ def test_garbage_makes_no_peer_and_gets_no_answer(bench):
         bench.receive(b"\xfd" + rng.bytes(40), OTHER)
     assert bench.sent == []
     assert OTHER not in bench.vehicle.peers.by_address
+
+
+def test_with_a_key_an_unsigned_radio_earns_no_telemetry(tmp_path):
+    file = tmp_path / "key"
+    file.write_text("11" * 32)
+    file.chmod(0o600)
+    bench = Bench(signing_key_file=str(file))
+    bench.sent.clear()
+    bench.send(dialect.MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1), address=OTHER)
+    bench.fly(0.1)
+    assert OTHER not in bench.vehicle.peers.by_address
+    assert all(to != OTHER for _, to in bench.sent)
 
 
 def test_own_ids_are_not_a_station(bench):
