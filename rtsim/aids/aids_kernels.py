@@ -19,14 +19,18 @@ AID_COUNT = 5
 # Places in the state.
 PITCH_REFERENCE, ALTITUDE_REFERENCE, AIRSPEED_REFERENCE = 0, 1, 2
 ALTITUDE_INTEGRAL, AIRSPEED_INTEGRAL, SCHEDULE_AIRSPEED = 3, 4, 5
-LEVER_REFERENCE, STICK_OFFSET, LEVER_OFFSET, LAST_SWITCHES = 6, 7, 8, 9
+LEVER_REFERENCE, STICK_OFFSET, LEVER_OFFSET, HANDS_LEVER, LEVER_TRIM, LAST_SWITCHES = 6, 7, 8, 9, 10, 11
 AID_STATE_SIZE = LAST_SWITCHES + AID_COUNT
 # Layers of AidTables.maps.
-MAP_STICK, MAP_PITCH_SENSITIVITY, MAP_PITCH_DAMPING, MAP_LEVER_LIFT, MAP_LEVER_THRUST = 0, 1, 2, 3, 4
-MAP_COUNT = 5
+MAP_STICK, MAP_PITCH_SENSITIVITY, MAP_PITCH_DAMPING, MAP_LEVER_LIFT, MAP_LEVER_THRUST, MAP_LEVER = 0, 1, 2, 3, 4, 5
+MAP_COUNT = 6
 
 CLIMB_PER_HEIGHT = 0.2
 """Climb rate asked for per height error in airplane mode [1/s]."""
+FASTEST_CLIMB = 5.0
+"""Largest climb rate altitude hold asks for, however far the height is off [m/s]."""
+PATH_TIME = 3.0
+"""Time in which the attitude altitude hold flies about follows the flight path in airplane mode [s]."""
 
 
 class AidTables(NamedTuple):
@@ -37,7 +41,8 @@ class AidTables(NamedTuple):
     nacelle: FloatArray
     """Nacelle axis [rad]."""
     maps: FloatArray
-    """Trim stick, pitch acceleration per stick and pitch rate, climb and forward acceleration per lever; (5, V, N)."""
+    """Trim stick, pitch acceleration per stick and pitch rate, climb and forward acceleration per lever, trim
+    lever; (6, V, N)."""
     schedule_time: float
     """Time constant of the airspeed that schedules the aids [s]."""
     damping: float
@@ -110,6 +115,23 @@ def _limited(value: float, limit: float) -> float:
 
 
 @inner_kernel
+def _share(tables: AidTables, nacelle: float) -> float:
+    """1 where the lever holds the height (helicopter), 0 where pitch does (airplane), smooth between."""
+    start, end = tables.blend
+    share = min(max((nacelle - start) / (end - start), 0.0), 1.0)
+    return share * share * (3.0 - 2.0 * share)
+
+
+@inner_kernel
+def _path_error(state: FloatArray, x: FloatArray) -> float:
+    """Change of pitch that altitude hold asks for in airplane mode, where the path follows pitch [rad]."""
+    st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
+    airspeed, climb = x[STATE.u] * ct + x[STATE.w] * st, x[STATE.u] * st - x[STATE.w] * ct
+    wanted = _limited(CLIMB_PER_HEIGHT * (state[ALTITUDE_REFERENCE] - x[STATE.altitude]), FASTEST_CLIMB)
+    return _limited((wanted - climb) / max(abs(airspeed), 20.0), 0.12)
+
+
+@inner_kernel
 def _terms(
     tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray
 ) -> tuple[float, float, float, float]:
@@ -119,32 +141,28 @@ def _terms(
     airspeed = x[STATE.u] * ct + x[STATE.w] * st
     climb = x[STATE.u] * st - x[STATE.w] * ct
     at = state[SCHEDULE_AIRSPEED]
-    start, end = tables.blend
-    share = min(max((nacelle - start) / (end - start), 0.0), 1.0)
-    share = share * share * (3.0 - 2.0 * share)
+    share = _share(tables, nacelle)
     height_error = state[ALTITUDE_REFERENCE] - x[STATE.altitude]
     speed_error = state[AIRSPEED_REFERENCE] - airspeed
 
-    lever = hands[1]
+    # A hold has the lever in its half of the flight and moves it with the trim; in the other half it is the hands'.
+    helicopter_lever = airplane_lever = hands[1]
     pitch_wanted = state[PITCH_REFERENCE]
-    if switches[ALTITUDE_HOLD] != 0.0:
-        w = tables.altitude_frequency
-        wanted = w * w * height_error - 1.6 * w * climb + state[ALTITUDE_INTEGRAL]
-        wanted = _limited(wanted, 2.5)
-        lift = max(scheduled(tables, MAP_LEVER_LIFT, at, nacelle), 4.0)
-        lever = state[LEVER_REFERENCE] + share * wanted / lift
-        # In airplane mode the path follows pitch: climb rate wanted over speed is the change of pitch.
-        remembered = state[ALTITUDE_INTEGRAL] / (w * w)
-        slope = (CLIMB_PER_HEIGHT * (height_error + remembered) - climb) / max(abs(airspeed), 20.0)
-        pitch_wanted += (1.0 - share) * _limited(slope, 0.12)
-    if switches[AIRSPEED_HOLD] != 0.0:
-        wanted = tables.airspeed_frequency * speed_error + state[AIRSPEED_INTEGRAL]
-        wanted = _limited(wanted, 1.5)
-        pitch_wanted -= share * wanted / 9.81
-        thrust = max(scheduled(tables, MAP_LEVER_THRUST, at, nacelle), 10.0)
-        if switches[ALTITUDE_HOLD] == 0.0:
-            lever = state[LEVER_REFERENCE] * (1.0 - share) + lever * share
-        lever += (1.0 - share) * wanted / thrust
+    if switches[ALTITUDE_HOLD] != 0.0 or switches[AIRSPEED_HOLD] != 0.0:
+        held = state[LEVER_REFERENCE] + scheduled(tables, MAP_LEVER, at, nacelle) - state[LEVER_TRIM]
+        if switches[ALTITUDE_HOLD] != 0.0:
+            w = tables.altitude_frequency
+            wanted = _limited(w * w * height_error - 1.6 * w * climb, 2.5) + state[ALTITUDE_INTEGRAL]
+            lift = max(scheduled(tables, MAP_LEVER_LIFT, at, nacelle), 4.0)
+            helicopter_lever = held + wanted / lift
+            pitch_wanted += (1.0 - share) * _path_error(state, x)
+        if switches[AIRSPEED_HOLD] != 0.0:
+            wanted = tables.airspeed_frequency * speed_error + state[AIRSPEED_INTEGRAL]
+            wanted = _limited(wanted, 1.5)
+            pitch_wanted -= share * wanted / 9.81
+            thrust = max(scheduled(tables, MAP_LEVER_THRUST, at, nacelle), 10.0)
+            airplane_lever = held + wanted / thrust
+    lever = share * helicopter_lever + (1.0 - share) * airplane_lever
 
     sensitivity = min(scheduled(tables, MAP_PITCH_SENSITIVITY, at, nacelle), -0.3)
     natural = min(scheduled(tables, MAP_PITCH_DAMPING, at, nacelle), 0.0)
@@ -194,6 +212,8 @@ def aids_engage(
     state[AIRSPEED_INTEGRAL] = 0.0
     state[SCHEDULE_AIRSPEED] = airspeed
     state[LEVER_REFERENCE] = acting[1]
+    state[HANDS_LEVER] = hands[1]
+    state[LEVER_TRIM] = scheduled(tables, MAP_LEVER, airspeed, nacelle)
     stick, lever, _, _ = _terms(tables, state, switches, x, nacelle, hands)
     state[STICK_OFFSET] = acting[0] - stick
     state[LEVER_OFFSET] = acting[1] - lever
@@ -246,7 +266,9 @@ def aids_step(
     start, end = tables.blend
     helicopter = nacelle > 0.5 * (start + end)
     pushed = _beyond(hands[0], tables.dead_zone)
-    moved = _beyond(hands[1] - state[LEVER_REFERENCE], 2.0 * tables.dead_zone)
+    if not helicopter and switches[AIRSPEED_HOLD] == 0.0:
+        state[HANDS_LEVER] = hands[1]  # the throttle of an airplane; where it stands is no wish to climb later
+    moved = _beyond(hands[1] - state[HANDS_LEVER], 2.0 * tables.dead_zone)
     if switches[AIRSPEED_HOLD] != 0.0:
         state[AIRSPEED_REFERENCE] += dt * 1.5 * (pushed if helicopter else moved)
         free = abs(speed_error) < 5.0
@@ -257,7 +279,9 @@ def aids_step(
         state[ALTITUDE_REFERENCE] += dt * 5.0 * (moved if helicopter else -pushed)
         if abs(height_error) < 20.0:
             gain = tables.altitude_frequency**2 / tables.integral_time
-            state[ALTITUDE_INTEGRAL] = _limited(state[ALTITUDE_INTEGRAL] + dt * gain * height_error, 2.0)
+            state[ALTITUDE_INTEGRAL] = _limited(state[ALTITUDE_INTEGRAL] + dt * gain * height_error, 4.0)
+        # The attitude that keeps the height changes with speed, flaps and nacelles.
+        state[PITCH_REFERENCE] += dt / PATH_TIME * (1.0 - _share(tables, nacelle)) * _path_error(state, x)
     held_by_hold = (switches[AIRSPEED_HOLD] != 0.0 and helicopter) or (
         switches[ALTITUDE_HOLD] != 0.0 and not helicopter
     )

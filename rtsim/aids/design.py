@@ -13,6 +13,7 @@ from rtsim.aids.aids_kernels import (
     ALTITUDE_HOLD,
     ATTITUDE_RETENTION,
     MAP_COUNT,
+    MAP_LEVER,
     MAP_LEVER_LIFT,
     MAP_LEVER_THRUST,
     MAP_PITCH_DAMPING,
@@ -55,6 +56,7 @@ def design_aids(database: Database) -> AidTables:
     pitch = database.x_ref[level, ..., names.index("pitch")]
     maps = np.zeros((MAP_COUNT, len(database.airspeed), len(database.nacelle)))
     maps[MAP_STICK] = database.u_ref[level, ..., stick]
+    maps[MAP_LEVER] = database.u_ref[level, ..., lever]
     maps[MAP_PITCH_SENSITIVITY] = reduced_b[..., 2, stick]
     maps[MAP_PITCH_DAMPING] = reduced_a[..., 2, 2]
     maps[MAP_LEVER_LIFT] = np.sin(pitch) * reduced_b[..., 0, lever] - np.cos(pitch) * reduced_b[..., 1, lever]

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from rtsim.aids import AIDS
 from rtsim.aids.handling import handling
-from rtsim.command import Command
+from rtsim.aircraft.signals import STATE
+from rtsim.command import Command, Sensors
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import COLUMN
+from rtsim.frame import COLUMN, FloatArray
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.programme import Programme
 from rtsim.simulation import FlightSetup, Simulation
+from rtsim.sticks.transition import TO_AIRPLANE, transition_schedule
 from rtsim.units import deg, kt
 
 CONDITIONS = [(0, 90), (20, 90), (40, 82), (60, 75), (80, 75), (105, 50), (130, 25), (170, 0)]
@@ -123,6 +127,56 @@ def test_hands_off_the_mocm() -> None:
         row = simulation.step(hands)
     assert row[COLUMN.stick] == pytest.approx(hands.stick, abs=0.01)
     assert row[COLUMN.lever] == pytest.approx(hands.lever, abs=0.01)
+
+
+def fly_hold(simulation: Simulation, seconds: float, command: Callable[[Sensors], Command]) -> FloatArray:
+    """Rows of a flight whose hands look at the sensors."""
+    return np.array([simulation.step(command(simulation.sensors())) for _ in range(round(250 * seconds))])
+
+
+def test_altitude_hold_keeps_the_height_through_a_conversion() -> None:
+    """From hover to 60 deg of nacelle along the centre line the lever comes back by a third of its travel by itself."""
+    simulation = Simulation(setup(0, 90, aids=(*STABILITY, "altitude_hold")))
+    lever = float(simulation._state.u[1])
+    schedule = transition_schedule(load_corridor("design"))
+
+    def hands(sensors: Sensors) -> Command:
+        wanted = schedule.target(TO_AIRPLANE, sensors.airspeed)
+        return Command(0.0, lever, float(np.clip(wanted - sensors.nacelle_angle, -deg(3.0), 0.0)))
+
+    rows = fly_hold(simulation, 90.0, hands)
+    assert rows[-1, COLUMN.nacelle_deg] < 62.0
+    assert rows[-1, COLUMN.lever] < lever - 0.25
+    np.testing.assert_allclose(rows[:, COLUMN.altitude_m], 100.0, atol=5.0)
+
+
+def test_altitude_hold_in_airplane_mode_leaves_the_throttle_and_finds_the_attitude() -> None:
+    """Less power is less speed at the same height, and the height comes back from any error without a dive."""
+    simulation = Simulation(setup(170, 0, aids=(*STABILITY, "altitude_hold")))
+    lever = float(simulation._state.u[1])
+    rows = fly_hold(simulation, 60.0, lambda _: Command(0.0, lever - 0.1, 0.0))
+    assert rows[-1, COLUMN.lever] == pytest.approx(lever - 0.1)
+    assert rows[-1, COLUMN.airspeed_kt] < 160.0
+    assert abs(rows[-1, COLUMN.altitude_m] - 100.0) < 5.0
+    simulation._state.x[STATE.altitude] += 200.0
+    rows = fly_hold(simulation, 60.0, lambda _: Command(0.0, lever - 0.1, 0.0))
+    assert np.min(rows[:, COLUMN.climb_rate_m_s]) > -8.0
+    assert abs(rows[-1, COLUMN.altitude_m] - 100.0) < 20.0
+
+
+def test_a_switch_during_altitude_hold_is_no_wish_to_climb() -> None:
+    """Where the hands' lever stands when another aid is switched does not move the height."""
+    simulation = Simulation(setup(40, 82, aids=(*STABILITY, "altitude_hold")))
+    lever = float(simulation._state.u[1]) + 0.2
+    simulation.step(Command(0.0, lever - 0.2, 0.0))
+    simulation.set_aid("altitude_hold", False)
+    simulation.step(Command(0.0, lever, 0.0))
+    simulation.set_aid("altitude_hold", True)
+    height = simulation.step(Command(0.0, lever, 0.0))[COLUMN.altitude_m]
+    for name in ("rate_damping", "trim_bias"):
+        simulation.set_aid(name, False)  # type: ignore[arg-type]
+        rows = fly_hold(simulation, 15.0, lambda _: Command(0.0, lever, 0.0))
+        np.testing.assert_allclose(rows[:, COLUMN.altitude_m], height, atol=3.0)
 
 
 @pytest.mark.parametrize(("airspeed", "nacelle"), [(0.0, 90.0), (60.0, 75.0), (130.0, 25.0)])
