@@ -233,9 +233,33 @@ def parse_stick_map(text: str, *, file: str) -> StickMap | InputError:
             "is no kind of stick map", file=file, key="kind", value=kind, allowed="vehicle, gamepad", mend="choose one"
         )
     try:
-        return models[kind].model_validate(data)
+        found = models[kind].model_validate(data)
     except ValidationError as error:
         return _explain(error, models[kind], file)
+    return _shared(found, file) or found
+
+
+def _shared(found: StickMap, file: str) -> InputError | None:
+    """The first axis or button that has two things to do: neither would work."""
+    if isinstance(found, VehicleMap):
+        from telemetry.mavlink.pilot_input import STANDARD_AXES, STANDARD_BUTTONS
+
+        axes: dict[str, Any] = {**STANDARD_AXES, **found.axes}
+        sources = {control: source.removeprefix("-") for control, source in axes.items() if source}
+        buttons: dict[Any, int] = {**STANDARD_BUTTONS, **found.buttons}
+    else:
+        sources = {control: axis["index"] for control, axis in found.axes.model_dump(exclude_none=True).items()}
+        buttons = dict(found.buttons)
+    for table, places in (("axes", sources), ("buttons", buttons)):
+        first: dict[Any, str] = {}
+        for key, place in places.items():
+            other = first.setdefault(place, key)
+            if other != key:
+                mend = f"move {table}.{other} or {table}.{key}"
+                return InputError(
+                    f"is used by {table}.{other} too", file=file, key=f"{table}.{key}", value=place, mend=mend
+                )
+    return None
 
 
 def _explain(error: ValidationError, model: type[BaseModel], file: str) -> InputError:
