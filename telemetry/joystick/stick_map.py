@@ -244,12 +244,12 @@ def _shared(found: StickMap, file: str) -> InputError | None:
     if isinstance(found, VehicleMap):
         from telemetry.mavlink.pilot_input import STANDARD_AXES, STANDARD_BUTTONS
 
-        axes: dict[str, Any] = {**STANDARD_AXES, **found.axes}
+        axes = STANDARD_AXES | {str(control): source for control, source in found.axes.items()}
         sources = {control: source.removeprefix("-") for control, source in axes.items() if source}
-        buttons: dict[Any, int] = {**STANDARD_BUTTONS, **found.buttons}
+        buttons = STANDARD_BUTTONS | {str(function): number for function, number in found.buttons.items()}
     else:
         sources = {control: axis["index"] for control, axis in found.axes.model_dump(exclude_none=True).items()}
-        buttons = dict(found.buttons)
+        buttons = {str(function): number for function, number in found.buttons.items()}
     for table, places in (("axes", sources), ("buttons", buttons)):
         first: dict[Any, str] = {}
         for key, place in places.items():
