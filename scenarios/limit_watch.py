@@ -58,12 +58,12 @@ class LimitWatch:
         self._levels = np.zeros(LEVEL_STATE_SIZE)
         self._told = np.zeros(KIND_COUNT)
         self._worst = np.full(KIND_COUNT, np.inf)
-        self._time_outside = np.zeros(KIND_COUNT)
+        self._outside_frames = np.zeros(KIND_COUNT, dtype=np.int64)
         self._reasons = [0, 0, 0]
         self._began: int | None = None  # frame in which a law began to act; None: none acts
         self._acted = 0  # last frame in which it did
         self._episodes = 0
-        self._active_s = [0.0, 0.0, 0.0]
+        self._active_frames = [0, 0, 0]
 
     def row(self, row: FloatArray) -> None:
         """Take one row of a paced flight.
@@ -108,12 +108,14 @@ class LimitWatch:
             name: {
                 "worst_margin": float(self._worst[k] / self._scale[k]),
                 "unit": self._units[k],
-                "outside_s": float(self._time_outside[k]),
+                "outside_s": int(self._outside_frames[k]) * self._dt,
             }
             for k, name in enumerate(WATCHED)
             if self._worst[k] < FAR and name != "nacelle_range"
         }
-        seconds = {f"{name}_s": value for (name, _), value in zip(_CHANNELS, self._active_s, strict=True)}
+        seconds = {
+            f"{name}_s": frames * self._dt for (name, _), frames in zip(_CHANNELS, self._active_frames, strict=True)
+        }
         return {"limits": limits, "interventions": {"episodes": self._episodes, **seconds}}
 
     def _start_anew(self) -> None:
@@ -131,7 +133,7 @@ class LimitWatch:
         ahead = np.ascontiguousarray(rows[:, COLUMN.time_to_limit_s])
         watch(self._tables, sensors, ahead, self._dt, self._levels, margins, levels)
         np.minimum(self._worst, margins.min(axis=0), out=self._worst)
-        self._time_outside += self._dt * np.count_nonzero(margins < self._outside, axis=0)
+        self._outside_frames += np.count_nonzero(margins < self._outside, axis=0)
         told = np.where(levels >= TOLD_FROM, levels, 0.0)
         if not told.any() and not self._told.any():
             return
@@ -166,7 +168,7 @@ class LimitWatch:
         if self._began is None and not acting.any():
             return
         for place in range(3):
-            self._active_s[place] += self._dt * int(np.count_nonzero(acting[:, place]))
+            self._active_frames[place] += int(np.count_nonzero(acting[:, place]))
         # Only frames at which something changes, and the last, are looked at one by one.
         change = np.any(reasons[1:] != reasons[:-1], axis=1)
         for number in sorted({0, len(rows) - 1, *(np.flatnonzero(change)), *(np.flatnonzero(change) + 1)}):
