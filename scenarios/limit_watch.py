@@ -59,7 +59,7 @@ class LimitWatch:
         self._told = np.zeros(KIND_COUNT)
         self._worst = np.full(KIND_COUNT, np.inf)
         self._outside_frames = np.zeros(KIND_COUNT, dtype=np.int64)
-        self._reasons = [0, 0, 0]
+        self._reasons: list[set[int]] = [{0}, {0}, {0}]  # of this episode, by channel; told once each
         self._began: int | None = None  # frame in which a law began to act; None: none acts
         self._acted = 0  # last frame in which it did
         self._episodes = 0
@@ -122,7 +122,7 @@ class LimitWatch:
         """A reset begins a new flight, whose levels are all clear."""
         self._levels[:] = 0.0
         self._told[:] = 0.0
-        self._reasons = [0, 0, 0]
+        self._reasons = [{0}, {0}, {0}]
         self._began = None
 
     def _watch_limits(self, rows: FloatArray) -> None:
@@ -183,10 +183,10 @@ class LimitWatch:
                 self._began = frame
                 self._episodes += 1
             self._acted = frame
-            # A channel is told again only when its limit is another one: limits at their edge come and go.
-            news = [place for place in range(3) if reasons[place] not in {0, self._reasons[place]}]
+            # Limits at their edge come and go: each is told once.
+            news = [place for place in range(3) if reasons[place] not in self._reasons[place]]
             for place in news:
-                self._reasons[place] = reasons[place]
+                self._reasons[place].add(reasons[place])
                 name = _CHANNELS[place][0]
                 data = {"channel": name, "limit": reasons[place]}
                 self._say(
@@ -199,7 +199,7 @@ class LimitWatch:
         frame = self._acted + round(LET_GO_S / self._dt)
         text = f"protection has let go after {seconds:.1f} s"
         self._noted.append(LogEvent(frame, frame * self._dt, "protection", text, "info", {"seconds": seconds}))
-        self._reasons = [0, 0, 0]
+        self._reasons = [{0}, {0}, {0}]
         self._began = None
 
     def _say(self, row: FloatArray, kind: str, text: str, level: str, data: dict[str, Any]) -> None:
