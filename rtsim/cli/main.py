@@ -133,6 +133,21 @@ def _silence(*, stdout_only: bool = False) -> None:
     os.close(sink)
 
 
+def _open_closed_streams() -> None:
+    """Give a process that was started without a standard stream (``>&-``) an empty one.
+
+    Otherwise the next file opened would get the descriptor, and whatever is printed would end up in it.
+    """
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest free descriptor: this one
+        if getattr(sys, name) is None:
+            stream = os.fdopen(descriptor, "r" if descriptor == 0 else "w", encoding="utf-8", closefd=False)
+            setattr(sys, name, stream)
+
+
 def _raise_terminated(signal_number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of a handler
     raise Terminated
 
@@ -213,6 +228,7 @@ def _usage_error(error: Exception, message: str) -> int:
 
 def main() -> None:
     """Entry point of the ``rtsim`` command: handles the signals of the process, then ends it with the exit code."""
+    _open_closed_streams()
     # Shells start background jobs with SIGINT ignored; a flight must still end cleanly when it is asked to.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGTERM, _raise_terminated)

@@ -179,3 +179,11 @@ def test_json_is_the_last_line_of_stdout():
     done = run_process("corridor", "--airspeed-kt", "100", "--nacelle-deg", "75", "--json")
     assert done.returncode == 0
     assert json.loads(done.stdout.splitlines()[-1])["inside"] is True
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_standard_streams_are_no_fault(closed):
+    shell = f'"{sys.executable}" -m rtsim corridor --json {closed}'
+    done = subprocess.run(["/bin/sh", "-c", shell], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0
+    assert done.stderr == ""
