@@ -161,18 +161,20 @@ def _point_result(corridor: Corridor, point: tuple[float, float], margins: Margi
     from rtsim.units import deg, to_deg, to_kt
 
     airspeed_kt, nacelle_deg = point
+    # Rounded first: a point on a boundary is inside, and there is no -0.
+    margin_low = round(to_kt(margins.low), _DIGITS) + 0.0
+    margin_high = round(to_kt(margins.high), _DIGITS) + 0.0
     return {
         "airspeed_kt": airspeed_kt,
         "nacelle_deg": nacelle_deg,
-        # Adding zero turns a rounded -0.0 into 0.0.
         "low_kt": round(airspeed_kt - to_kt(margins.low), _DIGITS) + 0.0,
         "high_kt": round(airspeed_kt + to_kt(margins.high), _DIGITS) + 0.0,
         "centre_kt": round(to_kt(float(corridor.centre_speed(deg(nacelle_deg)))), _DIGITS),
-        "margin_low_kt": round(to_kt(margins.low), _DIGITS),
-        "margin_high_kt": round(to_kt(margins.high), _DIGITS),
+        "margin_low_kt": margin_low,
+        "margin_high_kt": margin_high,
         "nacelle_forward_deg": round(to_deg(margins.nacelle_forward), _DIGITS),
         "nacelle_aft_deg": round(to_deg(margins.nacelle_aft), _DIGITS),
-        "inside": min(margins.low, margins.high) >= 0.0,
+        "inside": min(margin_low, margin_high) >= 0.0,
     }
 
 

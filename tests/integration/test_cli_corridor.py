@@ -33,6 +33,12 @@ def test_margins_of_a_point(capsys):
     assert result["nacelle_aft_deg"] == 45.0
 
 
+def test_a_point_on_a_boundary_is_inside(capsys):
+    result = answer(capsys, "--airspeed-kt", "5", "--nacelle-deg", "74")
+    assert (str(result["margin_low_kt"]), result["inside"]) == ("0.0", True)
+    assert str(answer(capsys, "--airspeed-kt", "60", "--nacelle-deg", "75")["low_kt"]) == "0.0"
+
+
 def test_flight_corridor_is_narrower(capsys):
     point = ("--airspeed-kt", "60", "--nacelle-deg", "70.5")
     assert answer(capsys, *point)["inside"] is True
