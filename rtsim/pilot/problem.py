@@ -325,7 +325,9 @@ def _check_attention(problem: MocmProblem) -> None:
             )  # fmt: skip
     total = sum(shares.values())
     if total > 1.0 + 1e-9:
-        raise MocmError("E_ATTENTION", f"instruments sum to {total:.4g}", key="f", value=f.tolist(), allowed="sum <= 1")
+        raise MocmError(
+            "E_ATTENTION", f"instruments sum to {total:.10g}", key="f", value=f.tolist(), allowed="sum <= 1"
+        )
 
 
 def _check_weights(problem: MocmProblem) -> None:
