@@ -10,6 +10,7 @@ import typer
 from rtsim.cli.flight_condition import (
     Request,
     checked,
+    checked_outer_loop,
     closed_loop_model,
     database_model,
     database_trim,
@@ -18,7 +19,7 @@ from rtsim.cli.flight_condition import (
     nonlinear_model,
     nonlinear_trim,
 )
-from rtsim.cli.output import emit_json, results
+from rtsim.cli.output import console, emit_json, results
 
 _AIRSPEED = typer.Option(help="Horizontal airspeed [kn].")
 _NACELLE = typer.Option(help="Nacelle angle [deg], 90 helicopter, 0 airplane.")
@@ -89,6 +90,8 @@ def trim_command(
         emit_json(result)
     if not point.converged:
         raise no_trim(request, point)
+    if result["beyond_limits"]:
+        console.print(f"This trim is beyond the aircraft: {', '.join(result['beyond_limits'])}.", soft_wrap=True)
     if not json:
         _print_trim(result)
 
@@ -136,6 +139,7 @@ def linearize_command(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
                 database)
     )  # fmt: skip
+    checked_outer_loop(outer_loop)
     if closed_loop:
         model = closed_loop_model(request, outer_loop)
     else:

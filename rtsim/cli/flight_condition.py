@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from rtsim.aircraft import Condition, TrimPoint, Variable
     from rtsim.lpv import LpvAircraft
+    from rtsim.pilot.schedule import OuterLoop
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -65,6 +66,17 @@ _LIMITS: tuple[tuple[str, float, float, str], ...] = (
 )
 
 
+_STOPS: tuple[tuple[str, float, float, str], ...] = (
+    ("stick_in", -4.8, 4.8, "in"),
+    ("lever_fraction", 0.0, 1.0, ""),
+    ("elevator_deg", -20.0, 20.0, "deg"),
+    ("cyclic_deg", -10.06, 10.06, "deg"),
+    ("flapping_deg", 0.0, 12.0, "deg"),
+    ("engine_power_shp", 0.0, 3604.0, "shp"),
+)
+"""Stops of controls and gimbal, and what both engines give for two minutes (docs/model.md)."""
+
+
 def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
     """Eigenvalues with natural frequency and damping ratio, slowest first.
 
@@ -107,8 +119,40 @@ def checked(request: Request) -> Request:
         value = getattr(request, name)
         if value is not None and not (math.isfinite(value) and low <= value <= high):
             option = "--" + name.replace("_", "-")
-            raise InputError("out of range", key=option, value=value, allowed=f"{low:g} to {high:g} {unit}")
+            raise InputError(
+                "out of range",
+                key=option,
+                value=value,
+                allowed=f"{low:g} to {high:g} {unit}",
+                mend="choose a value in this range",
+            )
     return request
+
+
+def checked_outer_loop(outer_loop: str) -> OuterLoop:
+    """Refuse an outer loop that there is not.
+
+    Args:
+        outer_loop: What was asked for.
+
+    Returns:
+        The same, as its type.
+
+    Raises:
+        InputError: Naming the option and the choices.
+    """
+    from rtsim.pilot.schedule import OUTER_LOOPS
+
+    for name in OUTER_LOOPS:
+        if name == outer_loop:
+            return name
+    raise InputError(
+        "no such outer loop",
+        key="--outer-loop",
+        value=outer_loop,
+        allowed=", ".join(OUTER_LOOPS),
+        mend="choose one",
+    )
 
 
 def _condition(request: Request) -> Condition:
@@ -219,9 +263,20 @@ def _trim_result(
         # where nothing was solved, the last iterate is no answer
         **(solved if converged else dict.fromkeys(solved)),
         "converged": converged,
+        "beyond_limits": _beyond_limits(solved) if converged else [],
         "inside_corridor": load_corridor("design").inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
         "source": "nonlinear" if request.solves_nonlinear else "database",
     }
+
+
+def _beyond_limits(solved: dict[str, float]) -> list[str]:
+    """What a trim asks of the aircraft that it cannot give, in words: the equations know no stops."""
+    found = []
+    for key, low, high, unit in _STOPS:
+        if not low - 1e-9 <= solved[key] <= high + 1e-9:
+            name = key.removesuffix(f"_{unit}").removesuffix("_fraction").replace("_", " ")
+            found.append(f"{name} {solved[key]:.3g} {unit}".rstrip() + f" (limits {low:g} to {high:g})")
+    return found
 
 
 def no_trim(request: Request, point: TrimPoint) -> TrimError:
@@ -255,12 +310,13 @@ def nonlinear_model(request: Request) -> dict[str, Any]:
         TrimError: There is no trim to linearize at.
     """
     from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Xv15
+    from rtsim.lpv.xv15 import flown_model
 
     aircraft, condition = Xv15.load(), _condition(request)
     point = aircraft.trim(condition)
     if not point.converged:
         raise no_trim(request, point)
-    model = aircraft.linearize(condition, point)
+    model = flown_model(aircraft, condition, point)
     return _model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
 
 
@@ -305,7 +361,6 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
 
     from rtsim.pilot.frozen import Condition as Command
     from rtsim.pilot.frozen import frozen_loop
-    from rtsim.pilot.schedule import OUTER_LOOPS
     from rtsim.units import deg, kt
 
     if request.solves_nonlinear:
@@ -314,9 +369,7 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
             key="--closed-loop",
             mend="leave out --nonlinear, flaps, rotor speed, weight, altitude and acceleration",
         )
-    chosen = next((name for name in OUTER_LOOPS if name == outer_loop), None)
-    if chosen is None:
-        raise InputError("no such outer loop", key="--outer-loop", value=outer_loop, allowed=", ".join(OUTER_LOOPS))
+    chosen = checked_outer_loop(outer_loop)
     aircraft = _lpv(request)
     airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
     point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)

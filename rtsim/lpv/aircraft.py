@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.points import TrimPoint
-from rtsim.errors import InputError
+from rtsim.errors import InputError, TrimError
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.storage import load_database
@@ -163,9 +163,14 @@ class LpvAircraft:
 
         Raises:
             InputError: Airspeed or nacelle angle outside the grid.
+            TrimError: A grid point around has no trim to linearize at; ``matrices`` gives what fills it.
         """
         import control
 
+        if not self.is_valid(airspeed=airspeed, nacelle=nacelle):
+            self._require_inside(airspeed, nacelle)
+            where = f"{to_kt(airspeed):.4g} kn at nacelle {to_deg(nacelle):.4g} deg"
+            raise TrimError(f"the database has no level-flight trim around {where}", mend="see database.valid")
         A, B, C, D = self.matrices(airspeed=airspeed, nacelle=nacelle)
         return control.StateSpace(
             A, B, C, D,
@@ -256,6 +261,7 @@ class LpvAircraft:
     def _require_inside(self, airspeed: float, nacelle: float) -> None:
         d = self.database
         degrees = f"angles are in radians: write nacelle=deg({nacelle:g}) with rtsim.units.deg"
+        nonlinear = "choose a value in this range, or solve the nonlinear model there (--nonlinear)"
         for name, value, axis, shown, unit in (
             ("airspeed", airspeed, d.airspeed, to_kt, "kn"),
             ("nacelle", nacelle, d.nacelle, to_deg, "deg"),
@@ -267,7 +273,7 @@ class LpvAircraft:
                     key=name,
                     value=f"{shown(value):g} {unit}",
                     allowed=f"{shown(axis[0]):g} to {shown(axis[-1]):g} {unit}",
-                    mend=degrees if name == "nacelle" and abs(value) > 2.0 * np.pi else None,
+                    mend=degrees if name == "nacelle" and abs(value) > 2.0 * np.pi else nonlinear,
                 )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 import rtsim
 import rtsim.aircraft
-from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Condition, TrimPoint, Variable, Xv15
+from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Condition, LinearModel, TrimPoint, Variable, Xv15
 from rtsim.aircraft import dynamics_kernels as kernels
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.lpv.build import GridPoint, Guess, Jacobians
@@ -138,16 +138,7 @@ class Xv15Grid:
             acceleration: Its level acceleration [m/s^2].
         """
         trim = TrimPoint(point.x, point.u, point.y, point.xdot, True, 0.0)
-        condition = _condition(airspeed, nacelle, acceleration)
-        model = self.aircraft.linearize(condition, trim)
-        # The flap schedule has corners on the downstop; a difference across one would be half a slope that is flown
-        # nowhere. There the flap is frozen, which is the derivative on the side where it does not move.
-        controls = self.aircraft.tables.controls
-        if nacelle <= controls.downstop_nacelle + CORNER_NACELLE:
-            frozen = self.aircraft.linearize(replace(condition, flap=self.flap(airspeed, nacelle)), trim)
-            if np.min(np.abs(controls.flap_retraction - airspeed)) < CORNER_AIRSPEED:
-                model = frozen
-            model = replace(model, df_dnacelle=frozen.df_dnacelle)
+        model = flown_model(self.aircraft, _condition(airspeed, nacelle, acceleration), trim)
         return model.A, model.B, model.C, model.D, model.df_dnacelle
 
     def flap(self, airspeed: float, nacelle: float) -> float:
@@ -158,6 +149,29 @@ class Xv15Grid:
             nacelle: Nacelle angle [rad].
         """
         return float(kernels.flap_schedule(self.aircraft.tables.controls, airspeed, nacelle))
+
+
+def flown_model(aircraft: Xv15, condition: Condition, trim: TrimPoint) -> LinearModel:
+    """Linear model as it is flown: at a corner of the flap schedule, of the side where the flap does not move.
+
+    Args:
+        aircraft: The nonlinear model.
+        condition: The flight condition.
+        trim: The trim found there.
+    """
+    model = aircraft.linearize(condition, trim)
+    if condition.flap is not None:
+        return model
+    # The flap schedule has corners on the downstop; a difference across one would be half a slope that is flown
+    # nowhere. There the flap is frozen, which is the derivative on the side where it does not move.
+    airspeed, nacelle, controls = condition.airspeed, condition.nacelle_angle, aircraft.tables.controls
+    if nacelle <= controls.downstop_nacelle + CORNER_NACELLE:
+        flap = float(kernels.flap_schedule(controls, airspeed, nacelle))
+        frozen = aircraft.linearize(replace(condition, flap=flap), trim)
+        if np.min(np.abs(controls.flap_retraction - airspeed)) < CORNER_AIRSPEED:
+            model = frozen
+        model = replace(model, df_dnacelle=frozen.df_dnacelle)
+    return model
 
 
 def _condition(airspeed: float, nacelle: float, acceleration: float) -> Condition:

@@ -91,6 +91,7 @@ def test_no_trim_is_exit_two_with_a_sentence(capsys):
         (("trim", *at(50, 80), "--database", "absent.nc"), ["absent.nc", "no such database file"]),
         (("linearize", *at(50, 80), "--closed-loop", "--nonlinear"), ["--closed-loop", "leave out"]),
         (("linearize", *at(50, 80), "--closed-loop", "--outer-loop", "lqg"), ["--outer-loop", "integrators, pi"]),
+        (("linearize", *at(50, 80), "--outer-loop", "lqg"), ["--outer-loop", "integrators, pi", "choose one"]),
         (("model", "export", "out.txt"), ["out.txt", ".nc or .mat"]),
         (("model", "import", "absent.mat"), ["absent.mat", "no such database file"]),
         (("model", "info", "absent.nc"), ["absent.nc", "no such database file"]),
@@ -123,6 +124,25 @@ def test_linearize_of_database_and_nonlinear_model_agree(capsys):
     mine = np.array(answer(capsys, "linearize", *at(60, 80))["A"])
     solved = np.array(answer(capsys, "linearize", *at(60, 80), "--nonlinear")["A"])
     np.testing.assert_allclose(mine, solved, rtol=1e-4, atol=1e-5 * np.abs(solved).max())
+
+
+@pytest.mark.parametrize("airspeed", [170, 180])
+def test_linearize_agrees_at_the_corners_of_the_flap_schedule(capsys, airspeed):
+    """A difference across the corner would give half a slope that is flown nowhere."""
+    mine = np.array(answer(capsys, "linearize", *at(airspeed, 0))["A"])
+    solved = np.array(answer(capsys, "linearize", *at(airspeed, 0), "--nonlinear")["A"])
+    np.testing.assert_allclose(mine, solved, rtol=1e-4, atol=1e-6 * np.abs(solved).max())
+
+
+def test_a_trim_beyond_the_aircraft_says_so(capsys):
+    assert run(["trim", *at(350, 15), "--nonlinear", "--json"]) == 0
+    out, err = capsys.readouterr()
+    result = json.loads(out.splitlines()[-1])
+    assert result["converged"] is True
+    assert result["lever_fraction"] > 1.0
+    assert [text.split(" (")[0].rpartition(" ")[0] for text in result["beyond_limits"][:1]] == ["lever"]
+    assert "beyond the aircraft: lever" in err
+    assert answer(capsys, "trim", *at(100, 75))["beyond_limits"] == []
 
 
 @pytest.mark.parametrize("outer_loop", ["integrators", "pi"])

@@ -8,7 +8,7 @@ import pytest
 
 import rtsim
 from rtsim.aircraft import Condition, Xv15
-from rtsim.errors import InputError
+from rtsim.errors import InputError, TrimError
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
 from rtsim.lpv.storage import save_database
@@ -67,6 +67,12 @@ def test_outside_the_database_is_refused(xv15, airspeed, nacelle, key):
     for method in (xv15.trim, xv15.linearize, xv15.matrices):
         with pytest.raises(InputError, match=f"{key}: outside the database"):
             method(airspeed=kt(airspeed), nacelle=deg(nacelle))
+
+
+def test_no_linear_model_where_there_is_no_trim(xv15):
+    """What fills the cells without a trim is for the kernels, not an answer."""
+    with pytest.raises(TrimError, match="no level-flight trim around 30 kn at nacelle 0 deg"):
+        xv15.linearize(airspeed=kt(30.0), nacelle=0.0)
 
 
 def test_linear_model_has_names_and_is_the_derivative(xv15, nonlinear):
