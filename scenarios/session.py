@@ -193,10 +193,8 @@ class FlightSession:
         """Hand the controls over from the coming frame on.
 
         Args:
-            pilot: ``mocm``, ``external`` (the plug-in), ``hold``, or ``next`` for the next one there is.
-
-        Raises:
-            InputError: If there is no such pilot in this flight.
+            pilot: ``mocm``, ``external`` (the plug-in), ``hold``, or ``next`` for the next one there is. One that this
+                flight does not have is refused by an event and changes nothing.
         """
         available = list(pilot_modes(plug_in=self._pilot is not None, hands=self._hands is not None))
         present = self.simulation.mode
@@ -210,9 +208,8 @@ class FlightSession:
                 if by_hand and self._hands is not None:
                     self._hands.engage()
                 return
-        raise InputError(
-            "is not a pilot of this flight", key="pilot", value=pilot, allowed=", ".join(available), mend="choose one"
-        )
+        text = f"'{pilot}' is not a pilot of this flight; there are {', '.join(available)}"
+        self._tell("refused", text, level="warning")
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend, from the coming frame on.

@@ -30,6 +30,8 @@ Action = Literal[
 
 WARP_STEPS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """Speeds that the keys ``+`` and ``-`` walk through, in multiples of real time."""
+PILOT_CHOICES = ("mocm", "external", "hold", "next")
+"""Whom the controls may be handed to."""
 SPEED_RANGE = (0.001, 1000.0)
 """Speeds a flight may be paced at, in multiples of real time."""
 
@@ -110,8 +112,16 @@ class FlightControl:
         """Hand the controls over.
 
         Args:
-            pilot: ``mocm``, ``external`` or ``hold``, or ``next`` for the next one that is available.
+            pilot: ``mocm``, ``external`` or ``hold``, or ``next`` for the next one that is available. One that this
+                flight does not have is refused by an event; the flight goes on.
+
+        Raises:
+            InputError: There is no such pilot in any flight.
         """
+        if pilot not in PILOT_CHOICES:
+            raise InputError(
+                "is not a pilot", key="pilot", value=pilot, allowed=", ".join(PILOT_CHOICES), mend="choose one"
+            )
         self.requests.append(Request("pilot", text=pilot))
 
     def override_protection(self) -> None:
