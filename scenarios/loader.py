@@ -134,7 +134,7 @@ def _read(name_or_path: str | Path) -> tuple[str, str]:
             raise InputError("is a directory", file=text, mend="name a scenario file")
         if path.stat().st_size > MAX_FILE_BYTES:
             raise InputError("is too large for a scenario", file=text, allowed=f"at most {MAX_FILE_BYTES} bytes")
-        return path.read_text(encoding="utf-8"), text
+        return path.read_text(encoding="utf-8-sig"), text  # some editors begin UTF-8 files with a mark
     except FileNotFoundError:
         raise InputError(
             "does not exist", file=text, mend=f"check the path, or take one of {', '.join(library_names())}"

@@ -102,7 +102,9 @@ def _explain_one(item: Any, location: tuple[str | int, ...], key: str, model: ty
         choices = _choices(field)
         if choices and isinstance(value, str):
             mend = suggestion(value, [str(choice) for choice in choices], otherwise="choose one")
-        elif kind != "literal_error":
+        elif kind == "literal_error":
+            allowed = allowed or str(item["ctx"]["expected"])  # an entry of a list
+        else:
             mend = "use letters, digits and underscores"
     elif kind.startswith(("greater_than", "less_than", "finite")):
         problem, mend = "is out of range", "choose a value in this range"

@@ -21,6 +21,7 @@ from rtsim.frame import FloatArray, history_sha256
 from rtsim.programme import Programme
 from rtsim.protection import load_boundary
 from rtsim.realtime import Executive, FlightControl, OverrunPolicy
+from rtsim.realtime.control import checked_speed
 from rtsim.realtime.report import TimingReport
 from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import to_deg, to_kt
@@ -32,6 +33,7 @@ from scenarios.metrics import flight_metrics
 from scenarios.nacelle_laws import automatic_nacelle, load_nacelle_law
 from scenarios.options import Overrides, with_overrides
 from scenarios.pilots import load_pilot
+from scenarios.preflight import preflight_problems
 from scenarios.record import FlightRecord, judge
 from scenarios.scenario import Scenario
 from scenarios.script_hands import ScriptHands
@@ -102,6 +104,10 @@ def fly(
         scenario = load_scenario(scenario)
     if overrides is not None:
         scenario = with_overrides(scenario, overrides)
+    for problem in preflight_problems(scenario):
+        raise problem
+    if speed != "max":
+        checked_speed(speed)
     policy = OverrunPolicy.parse(overrun_policy)
     outputs = outputs if outputs is not None else FlightOutputs()
     pilot_factory = load_pilot(scenario.pilot)

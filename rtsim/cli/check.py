@@ -79,7 +79,14 @@ def file_problems(name: str) -> list[str]:
         ]
     if suffix == ".toml" and _is_stick_map(Path(name)):
         return _stick_map_problems(name)
-    return [str(problem) for problem in scenario_problems(name)]
+    problems = scenario_problems(name)
+    if not problems:
+        from scenarios.loader import load_scenario
+        from scenarios.preflight import preflight_problems, start_problems
+
+        scenario = load_scenario(name)
+        problems = preflight_problems(scenario) + start_problems(scenario)
+    return [str(problem) for problem in problems]
 
 
 def _is_stick_map(path: Path) -> bool:

@@ -181,12 +181,11 @@ def fly_command(
         OutputError: A log or recording failed.
         OverrunStop: The overrun policy ended the flight.
     """
-    from rtsim.protection import load_laws
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
-    from scenarios.nacelle_laws import load_nacelle_law
     from scenarios.options import Overrides, chosen_scenario
-    from scenarios.pilots import HAND_PILOT, load_pilot
+    from scenarios.pilots import HAND_PILOT
+    from scenarios.preflight import preflight_problems
 
     OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
@@ -209,9 +208,8 @@ def fly_command(
     )
     pace = parse_speed(speed)
     chosen = chosen_scenario(scenario, overrides)
-    load_pilot(chosen.pilot)
-    load_nacelle_law(chosen.nacelle)
-    load_laws(chosen.protection)
+    for problem in preflight_problems(chosen):
+        raise problem
     link = None
     if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
         from scenarios.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced

@@ -279,3 +279,23 @@ def test_the_corridor_makes_events_unless_it_is_off(tmp_path: Path) -> None:
     unwatched = fast(str(path), protection="off")
     assert not [event for event in unwatched.events if event.kind == "corridor"]
     assert unwatched.history_sha256 == watched.history_sha256
+
+
+def test_handing_over_to_a_pilot_that_is_not_there_changes_nothing() -> None:
+    control = FlightControl()
+    control.step(100)
+    acts = deque([lambda: (control.set_pilot("external"), control.resume())])
+    outputs = FlightOutputs(on_rows=lambda _row: acts.popleft()() if acts else None)
+    flight = fast("hover", duration=1.0, control=control, outputs=outputs)
+    assert flight.completed
+    refused = next(event for event in flight.events if event.kind == "refused")
+    assert refused.level == "warning"
+    assert "'external' is not a pilot of this flight" in refused.text
+    assert flight.history_sha256 == fast("hover", duration=1.0).history_sha256
+    with pytest.raises(InputError, match="allowed: mocm, external, hold, next"):
+        control.set_pilot("nobody")
+
+
+def test_a_speed_in_words_is_refused() -> None:
+    with pytest.raises(InputError, match="--speed: is out of range"):
+        scenarios.fly("hover", speed="fast")  # type: ignore[arg-type]

@@ -6,9 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from rtsim.cli.check import file_problems
 from rtsim.errors import InputError
 from rtsim.units import kt, to_deg, to_kt
 from scenarios.loader import library_names, load_scenario, parse_scenario, scenario_problems
+from scenarios.options import Overrides, with_overrides
+from scenarios.preflight import preflight_problems
 from scenarios.scenario import Expectation
 
 GOOD = """
@@ -203,3 +206,51 @@ def test_limits_as_reported() -> None:
     assert Expectation("x", "stick.rms_in", None, 2.0).limit == 2.0
     assert Expectation("x", "stick.rms_in", 1.0, None).holds(99.0)
     assert not Expectation("x", "stick.rms_in", 1.0, None).holds(float("nan"))
+
+
+HOLD = 'format = 1\nname = "mine"\ntitle = "Mine"\nduration_s = 2\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            HOLD + '[flight]\npilot = "nobody"\n[start]\ncondition = "hover"\n',
+            "flight.pilot: is not a pilot (got 'nobody')",
+        ),
+        (
+            HOLD + '[flight]\nprotection = "maximum"\n[start]\ncondition = "hover"\n',
+            "flight.protection: is not a protection law (got 'maximum')",
+        ),
+        (
+            HOLD + '[start]\ncondition = "hover"\n[[events]]\ntime_s = 1\naction = "pilot"\npilot = "external"\n',
+            "events[0].pilot: is not a pilot of this flight (got 'external')",
+        ),
+        (HOLD + "[start]\nairspeed_kt = 30\nnacelle_deg = 0\n", "start: the aircraft has no level-flight trim there"),
+        (
+            HOLD + '[flight]\naids = ["autoland"]\n[start]\ncondition = "hover"\n',
+            "(got 'autoland'); allowed: 'rate_damping'",
+        ),
+    ],
+)
+def test_check_finds_what_would_keep_it_from_being_flown(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    [problem] = file_problems(str(path))
+    assert problem.startswith(str(path))
+    assert words in problem
+
+
+def test_names_in_a_file_are_refused_with_the_file_and_options_with_the_option(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(HOLD + '[flight]\npilot = "nobody"\n[start]\ncondition = "hover"\n', encoding="utf-8")
+    [problem] = preflight_problems(load_scenario(path))
+    assert str(problem).startswith(f"{path}: flight.pilot: ")
+    [problem] = preflight_problems(with_overrides(load_scenario(path), Overrides(pilot="somebody")))
+    assert str(problem).startswith("--pilot: ")
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(GOOD, encoding="utf-8-sig")
+    assert scenario_problems(path) == []
