@@ -89,7 +89,7 @@ class Simulation:
         self._applied = np.zeros(3)
         self._observed = False
         self._noise = np.zeros(self._noise_width)
-        laws = load_laws(setup.protection, boundary=setup.protection_boundary)
+        laws = load_laws(setup.protection, boundary=setup.protection_boundary, database=setup.database)
         self.laws = LawChain(laws, dt=self.tables.dt) if compiled_law(laws) is None else None
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
 

@@ -85,6 +85,8 @@ class FlightSetup:
     ``full``, ``MODULE:CLASS`` or an entry point."""
     protection_boundary: BoundaryName = "flight"
     """Corridor that the built-in laws keep to."""
+    database: str = ""
+    """LPV database that is flown, a file (``.nc``, ``.mat``); empty: the shipped XV-15."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     Raises:
         InputError: The start has no trim.
     """
-    lpv_aircraft = load_aircraft()
+    lpv_aircraft = load_aircraft(setup.database or None)
     database = lpv_aircraft.database
     nonlinear_aircraft = Xv15.load()
     airspeed, nacelle, altitude = _start(setup)

@@ -14,6 +14,8 @@ import numpy as np
 
 from rtsim.corridor import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.lpv.database import Database
+from rtsim.lpv.storage import load_database
 from rtsim.protection.law_data import SENSOR_COUNT
 from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, protection_data
 from rtsim.protection.monitor import UNIT_SCALE, WATCHED, monitor_tables, sensors_of_rows
@@ -37,15 +39,16 @@ _CHANNELS = (
 class LimitWatch:
     """One flight's limits and interventions."""
 
-    def __init__(self, corridor_name: str, tell: Callable[[LogEvent], None], *, dt: float) -> None:
+    def __init__(self, corridor_name: str, tell: Callable[[LogEvent], None], *, dt: float, database: str = "") -> None:
         """Load the limits.
 
         Args:
             corridor_name: Corridor that is watched.
             tell: Told every event.
             dt: Length of a frame [s].
+            database: LPV database of the aircraft, a file; empty: the shipped XV-15.
         """
-        self._tables = _tables(corridor_name)
+        self._tables = _tables(corridor_name, load_database(database or None))
         self._dt, self._tell = dt, tell
         self._noted: list[LogEvent] = []
         levels = protection_data()["levels"]
@@ -211,7 +214,5 @@ def _limit(number: int) -> str:
 
 
 @functools.lru_cache(maxsize=4)
-def _tables(corridor_name: str) -> MonitorTables:
-    from rtsim.lpv.storage import load_database
-
-    return monitor_tables(corridor_name, load_database())
+def _tables(corridor_name: str, database: Database) -> MonitorTables:
+    return monitor_tables(corridor_name, database)

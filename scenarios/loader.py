@@ -108,6 +108,11 @@ def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> Progra
     return ProgrammePoint(airspeed, nacelle_angle, altitude)
 
 
+def _beside(database: str, file: str) -> str:
+    """A database as a path: relative ones lie beside the scenario."""
+    return str((Path(file).parent / database).resolve()) if database else ""
+
+
 def _lower(message: str) -> str:
     return message[:1].lower() + message[1:]
 
@@ -267,6 +272,7 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         source=text,
         file=file,
         nacelle=options.nacelle,
+        database=_beside(options.database, file),
         automatic=automatic_settings(content.automatic),
         pulses=pulses_of(content.pulses),
         trial=trial_of(content.trial),

@@ -34,6 +34,7 @@ class Overrides:
     outer_loop: OuterLoop | None = None
     pilot: str | None = None
     protection: str | None = None
+    database: str | None = None
     nacelle: str | None = None
     """Who sets the nacelle rate: ``programme``, ``automatic`` or MODULE:CLASS."""
     corridor: CorridorName | None = None
@@ -87,13 +88,15 @@ def with_overrides(scenario: Scenario, overrides: Overrides) -> Scenario:
     return _with_options(_displaced(scenario, overrides), overrides)
 
 
+_PLAIN = (
+    "plant", "outer_loop", "pilot", "protection", "corridor", "database", "rate_hz", "seed", "wind", "pilot_noise",
+)  # fmt: skip
+"""Fields of a scenario that an override replaces as they are."""
+
+
 def _with_options(scenario: Scenario, overrides: Overrides) -> Scenario:
     """Apply everything but the start."""
-    plain = {
-        name: getattr(overrides, name)
-        for name in ("plant", "outer_loop", "pilot", "protection", "corridor", "rate_hz", "seed", "wind", "pilot_noise")
-        if getattr(overrides, name) is not None
-    }
+    plain = {name: getattr(overrides, name) for name in _PLAIN if getattr(overrides, name) is not None}
     changed = dataclasses.replace(scenario, **plain)
     if overrides.nacelle is not None:
         changed = dataclasses.replace(changed, nacelle=overrides.nacelle)

@@ -56,7 +56,11 @@ def start_problems(scenario: Scenario) -> list[InputError]:
     from rtsim.lpv.aircraft import load_aircraft
 
     try:
-        trimmed = load_aircraft().trim(airspeed=start.airspeed, nacelle=start.nacelle_angle).converged
+        trimmed = (
+            load_aircraft(scenario.database or None)
+            .trim(airspeed=start.airspeed, nacelle=start.nacelle_angle)
+            .converged
+        )
     except RtsimError:
         trimmed = False
     if trimmed:

@@ -18,6 +18,7 @@ from pydantic import TypeAdapter
 import rtsim
 from rtsim.errors import OutputError
 from rtsim.frame import FloatArray, history_sha256
+from rtsim.lpv.storage import load_database
 from rtsim.programme import Programme
 from rtsim.protection import load_boundary
 from rtsim.realtime import Executive, FlightControl, OverrunPolicy
@@ -203,16 +204,18 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),
         protection=scenario.protection,
         protection_boundary=scenario.corridor_name,
+        database=scenario.database,
     )
 
 
-def corridor_outline(name: str) -> CorridorOutline:
+def corridor_outline(name: str, database: str = "") -> CorridorOutline:
     """The boundaries of a corridor as plain arrays, for views and logs.
 
     Args:
         name: ``design``, ``flight`` or ``model``.
+        database: LPV database that ``model`` is computed from, a file; empty: the shipped XV-15.
     """
-    corridor = load_boundary(name)
+    corridor = load_boundary(name, load_database(database) if database and name == "model" else None)
     high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
     high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
     high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]
@@ -289,7 +292,7 @@ def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
 
     return RerunView(
         outputs.view,
-        corridor=corridor_outline(scenario.corridor_name),
+        corridor=corridor_outline(scenario.corridor_name, scenario.database),
         title=scenario.name,
         rate_hz=scenario.rate_hz,
         on_message=outputs.on_message,
@@ -350,7 +353,7 @@ def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutput
         rate_hz=float(scenario.rate_hz),
         versions=versions(),
         setup=replay_setup(scenario),
-        corridor=corridor_outline(scenario.corridor_name),
+        corridor=corridor_outline(scenario.corridor_name, scenario.database),
     )
     return Recorder(outputs.log, metadata, live=live, overwrite=outputs.overwrite)
 
@@ -386,7 +389,7 @@ def _limit_watch(scenario: Scenario, dt: float) -> Callable[[Callable[[LogEvent]
     """What watches the flight's limits; nothing with the protection off."""
     if scenario.protection == "off":
         return None
-    return functools.partial(LimitWatch, scenario.corridor_name, dt=dt)
+    return functools.partial(LimitWatch, scenario.corridor_name, dt=dt, database=scenario.database)
 
 
 def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | None) -> OutputError | None:

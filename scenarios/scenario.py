@@ -115,6 +115,8 @@ class Scenario:
     """Text of the file it came from; empty for scenarios made in Python."""
     file: str
     """Where it came from, as shown in messages."""
+    database: str = ""
+    """LPV database that is flown, a file; empty: the shipped XV-15."""
     nacelle: str = "programme"
     """Who sets the nacelle rate: ``programme`` (the pilot, as the programme asks), ``automatic``, or MODULE:CLASS."""
     automatic: AutomaticSettings = field(default_factory=AutomaticSettings)

@@ -47,6 +47,7 @@ class FlightTable(Strict):
     corridor: CorridorName | None = None
     protection: ProtectionName = "monitor"
     nacelle: NacelleName = "programme"
+    database: Annotated[str, Field(max_length=1000)] = ""
     rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
     wind_kt: Annotated[float, Field(ge=-40.0, le=40.0, allow_inf_nan=False)] = 0.0

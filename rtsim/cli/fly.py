@@ -87,6 +87,10 @@ def fly_command(
             show_default="the scenario's; design, or flight with a protection that acts",
         ),
     ] = None,
+    database: Annotated[
+        Path | None,
+        typer.Option(help="LPV database of your own (.nc, .mat).", show_default="the scenario's, the shipped XV-15"),
+    ] = None,
     speed: Annotated[str, typer.Option(help="Multiple of real time, or max: headless, as fast as it goes.")] = "1",
     rate: Annotated[int | None, typer.Option(help="Frames per second [Hz].", show_default="250")] = None,
     seed: Annotated[int | None, typer.Option(help="Root of every random stream.", show_default="0")] = None,
@@ -150,6 +154,7 @@ def fly_command(
         protection: Protection laws in the order in which they act.
         nacelle: Who sets the nacelle rate.
         corridor: Boundaries to watch.
+        database: LPV database to fly.
         speed: Multiple of real time, or max.
         rate: Frames per second [Hz].
         seed: Root of every random stream.
@@ -195,6 +200,7 @@ def fly_command(
         protection=protection,
         nacelle=nacelle,
         corridor=corridor,
+        database=None if database is None else str(database.resolve()),
         rate_hz=rate,
         seed=seed,
         wind=None if wind_kt is None else kt(wind_kt),

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 _SUFFIXES = (".nc", ".mat")
+_JOBS = 2
+_PILOT_FORMS = 2
 _BUILD_SHARE, _PILOT_SHARE = 0.2, 0.4  # of the work: the trims and models, and each of the two pilot forms
 
 
@@ -45,7 +47,7 @@ def _group() -> None:
 def build_command(
     *,
     out: Annotated[Path | None, typer.Option(help="File to write; the default is the shipped database.")] = None,
-    jobs: Annotated[int, typer.Option(help="Processes to use.", min=1, max=64)] = 2,
+    jobs: Annotated[int, typer.Option(help="Processes to use.", min=1, max=64)] = _JOBS,
     without_pilot: Annotated[bool, typer.Option("--without-pilot", help="Leave the pilot's gains out.")] = False,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
@@ -82,15 +84,16 @@ def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> 
 
     share = 1.0 if without_pilot else _BUILD_SHARE
     database = build_database(Xv15Grid(), conversion_grid(), jobs=jobs, progress=lambda part: advance(share * part))
-    if without_pilot:
-        return database
+    return database if without_pilot else _with_pilots(database, jobs, lambda part: advance(_PILOT_SHARE * part))
+
+
+def _with_pilots(database: Database, jobs: int, advance: Callable[[float], None]) -> Database:
+    """Design the MOCM in all its forms; each tells its progress from 0 to 1."""
     from rtsim.lpv.database import JACOBIAN_BITS, PilotArrays, round_mantissa
     from rtsim.pilot.schedule import OUTER_LOOPS, design_schedule
 
     for outer_loop in OUTER_LOOPS:
-        pilot = design_schedule(
-            database, outer_loop=outer_loop, jobs=jobs, progress=lambda part: advance(_PILOT_SHARE * part)
-        )
+        pilot = design_schedule(database, outer_loop=outer_loop, jobs=jobs, progress=advance)
         stored = pilot.to_arrays()
         rounded = {name: round_mantissa(array, JACOBIAN_BITS) for name, array in stored.arrays.items()}
         database = database.with_pilot(outer_loop, PilotArrays(rounded, stored.attributes))
@@ -149,15 +152,20 @@ def import_command(
     out: Annotated[
         Path | None, typer.Option(help="NetCDF file to write; default: beside FILE, named *.rtsim.nc.")
     ] = None,
+    design_pilots: Annotated[
+        bool, typer.Option("--design-pilots", help="Design the MOCM for it, in place of the gains it carries.")
+    ] = False,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Check a database of your own and write it as rtsim's NetCDF file.
 
-    Fly it from Python with rtsim.load_aircraft(FILE), look at it with 'rtsim trim --database FILE'.
+    Fly it with 'rtsim fly --database FILE', look at it with 'rtsim trim --database FILE', or take it into Python with
+    rtsim.load_aircraft(FILE).
 
     Args:
         file: Database to read.
         out: File to write.
+        design_pilots: Design the MOCM for it.
         json: Print one JSON object on stdout.
 
     Raises:
@@ -170,6 +178,9 @@ def import_command(
     if target.suffix.lower() != ".nc":
         raise InputError("not the name of a NetCDF file", key="--out", value=str(target), mend="end it in .nc")
     database = load_database(file)
+    if design_pilots:
+        with progress("Designing the pilots", total=1.0) as advance:
+            database = _with_pilots(database, _JOBS, lambda part: advance(part / _PILOT_FORMS))
     save_database(database, target)
     result = {"file": str(target), **summary(database)}
     if json:

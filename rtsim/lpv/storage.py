@@ -22,17 +22,18 @@ def load_database(path: str | Path | None = None) -> Database:
     Raises:
         InputError: The file is missing, not readable, or not a database the kernels could fly.
     """
-    if path is not None and Path(path).suffix.lower() == ".mat":
-        return read_mat(path)
-    if path is None and SHIPPED.is_file():
-        return _read_once(SHIPPED.stat().st_mtime_ns)
-    return read_database(path)
+    file = SHIPPED if path is None else Path(path)
+    return _read_once(file, file.stat().st_mtime_ns) if file.is_file() else _read(file)
 
 
-@functools.lru_cache(maxsize=1)
-def _read_once(_modified: int) -> Database:
-    """Keep the shipped database: its arrays are read-only, and a batch of flights asks for it again and again."""
-    return read_database()
+@functools.lru_cache(maxsize=2)
+def _read_once(file: Path, _modified: int) -> Database:
+    """Keep what was read: its arrays are read-only, and a batch of flights asks for it again and again."""
+    return _read(file)
+
+
+def _read(file: Path) -> Database:
+    return read_mat(file) if file.suffix.lower() == ".mat" else read_database(file)
 
 
 def save_database(database: Database, path: str | Path) -> None:

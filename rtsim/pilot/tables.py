@@ -43,7 +43,8 @@ def load_pilot_tables(database: Database, outer_loop: OuterLoop = "integrators",
     if outer_loop not in database.pilot:
         raise InputError(
             "the database holds no gains for this pilot", key=f"pilot/{outer_loop}",
-            allowed=", ".join(database.pilot) or "none", mend="build them with rtsim model build",
+            allowed=", ".join(database.pilot) or "none",
+            mend="design them with rtsim model import FILE --design-pilots",
         )  # fmt: skip
     return pack_pilot(database, ScheduledPilot.from_arrays(database.pilot[outer_loop]), dt=dt)
 

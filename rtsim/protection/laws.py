@@ -170,6 +170,8 @@ class LawSpec:
     """Built-in name, entry point or ``MODULE:CLASS``."""
     boundary: BoundaryName = "flight"
     """Corridor that a built-in law keeps to."""
+    database: str = ""
+    """LPV database of the aircraft that a built-in law knows, a file; empty: the shipped XV-15."""
 
     @property
     def built_in(self) -> bool:
@@ -188,7 +190,7 @@ class LawSpec:
             InputError: There is no such law, or its class cannot be made.
         """
         if self.built_in:
-            return BuiltInLaw(self.name, boundary=self.boundary)
+            return BuiltInLaw(self.name, boundary=self.boundary, database=load_database(self.database or None))
         factory = _find(self.name)
         try:
             made: ProtectionLaw = factory()
@@ -202,13 +204,14 @@ class LawSpec:
         return made
 
 
-def load_law(name: str, *, boundary: BoundaryName = "flight") -> LawSpec:
+def load_law(name: str, *, boundary: BoundaryName = "flight", database: str = "") -> LawSpec:
     """Find a law by name.
 
     Args:
         name: ``off``, ``monitor``, ``governor``, ``full``, the name of an entry point in the group
             ``rtsim.protection_laws``, or ``MODULE:CLASS``; modules are also looked for in the current directory.
         boundary: Corridor that a built-in law keeps to.
+        database: LPV database of the aircraft that a built-in law knows, a file; empty: the shipped XV-15.
 
     Returns:
         The law; ``make()`` gives a fresh one for a flight, ``compiled_id`` its number for batches.
@@ -216,18 +219,21 @@ def load_law(name: str, *, boundary: BoundaryName = "flight") -> LawSpec:
     Raises:
         InputError: There is no such law, or it has no method ``step``.
     """
-    spec = LawSpec(name, boundary)
+    spec = LawSpec(name, boundary, database)
     if not spec.built_in:
         _find(name)
     return spec
 
 
-def load_laws(names: str | Sequence[str], *, boundary: BoundaryName = "flight") -> tuple[LawSpec, ...]:
+def load_laws(
+    names: str | Sequence[str], *, boundary: BoundaryName = "flight", database: str = ""
+) -> tuple[LawSpec, ...]:
     """Find a chain of laws.
 
     Args:
         names: The laws in the order in which they act, as a sequence or separated by commas.
         boundary: Corridor that built-in laws keep to.
+        database: LPV database of the aircraft that built-in laws know, a file; empty: the shipped XV-15.
 
     Returns:
         The laws; ``off`` is left out of a chain of several.
@@ -236,7 +242,7 @@ def load_laws(names: str | Sequence[str], *, boundary: BoundaryName = "flight") 
         InputError: One of them is none.
     """
     listed = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
-    laws = tuple(load_law(name, boundary=boundary) for name in listed)
+    laws = tuple(load_law(name, boundary=boundary, database=database) for name in listed)
     if len(laws) == 1:
         return laws
     return tuple(law for law in laws if law.name != "off")
