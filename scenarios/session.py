@@ -286,7 +286,7 @@ class FlightSession:
         try:
             answer = pilot.step(simulation.sensors(), simulation.reference(), simulation.dt)
             command = Command(float(answer.stick), float(answer.lever), float(answer.nacelle_rate))
-        except Exception as error:  # noqa: BLE001 - a user's own code may raise anything; the flight must end cleanly
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything; end cleanly
             problem = f"raised {type(error).__name__}: {error}"
         else:
             if math.isfinite(command.stick + command.lever + command.nacelle_rate):

@@ -18,6 +18,7 @@ from rtsim.cli.flight_condition import (
     no_trim,
     nonlinear_model,
     nonlinear_trim,
+    solvable,
 )
 from rtsim.cli.output import console, emit_json, results
 
@@ -61,7 +62,8 @@ def trim_command(
     """Show one trim point: attitude, controls, loads and power in level flight.
 
     From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m and
-    --acceleration-kt-s, solved by the nonlinear model at exactly that condition.
+    --acceleration-kt-s, solved by the nonlinear model at exactly that condition. At the edge of what the database
+    covers, where one of the grid points around has no trim, the nonlinear model is asked too.
 
     Args:
         airspeed_kt: Horizontal airspeed [kn].
@@ -82,10 +84,8 @@ def trim_command(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
                 database)
     )  # fmt: skip
-    if request.solves_nonlinear:
-        result, point = nonlinear_trim(request)
-    else:
-        result, point = database_trim(request)
+    request = solvable(request)
+    result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
     if json:
         emit_json(result)
     if not point.converged:
@@ -143,6 +143,7 @@ def linearize_command(
     if closed_loop:
         model = closed_loop_model(request, outer_loop)
     else:
+        request = solvable(request)
         model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
         model["eigenvalues"] = eigenvalues(model["A"])
     result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -216,6 +217,27 @@ def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
     values = _named(point, database.states, database.inputs, database.outputs)
     return _trim_result(request, values, to_deg(flap), to_rpm(database.rotor_speed), point.converged), point
+
+
+def solvable(request: Request) -> Request:
+    """Ask the nonlinear model where the shipped database has no answer: beside its edge there may be a trim.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The request, or the same for the nonlinear model.
+
+    Raises:
+        InputError: The condition is outside the database.
+    """
+    from rtsim.units import deg, kt
+
+    if request.solves_nonlinear or request.database is not None:
+        return request
+    if _lpv(request).trim(airspeed=kt(request.airspeed_kt), nacelle=deg(request.nacelle_deg)).converged:
+        return request
+    return dataclasses.replace(request, nonlinear=True)
 
 
 def _lpv(request: Request) -> LpvAircraft:
