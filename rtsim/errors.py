@@ -6,6 +6,14 @@ EXIT_EXPECTATION_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_OVERRUN = 3
 EXIT_OUTPUT_FAILED = 4
+EXIT_TERMINATED = 143
+
+
+class Terminated(SystemExit):
+    """SIGTERM arrived: unwinds like Ctrl-C, so that files are closed, and ends with exit code 143."""
+
+    def __init__(self) -> None:
+        super().__init__(EXIT_TERMINATED)
 
 
 class RtsimError(Exception):
@@ -49,7 +57,7 @@ class InputError(RtsimError):
             text += f"; allowed: {allowed}"
         if mend:
             text += f"; {mend}"
-        super().__init__(text + ".")
+        super().__init__(text if text.endswith("?") else text + ".")
 
 
 class OutputError(RtsimError):

@@ -14,11 +14,15 @@ from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
 from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
 from scenarios.metrics import flight_metrics
-from scenarios.scenario import PlantName, Scenario
+from scenarios.scenario import CorridorName, Expectation, PlantName, Scenario
 from scenarios.verdict_events import new_violations
 from scenarios.verdict_metrics import TrialMetrics
 from scenarios.verdict_trial import Trial
 
+TEST_CORRIDOR: CorridorName = "flight"
+"""Corridor of scenarios that name none."""
+LAW_CLAUSE = "law"
+"""Metric of the clause that the law runs without failing."""
 HAND_PILOT = "mavlink"
 """Scenarios with this pilot need a person and are no tests."""
 
@@ -102,6 +106,11 @@ class Case:
         """Clauses that did not hold."""
         return tuple(finding for finding in self.findings if not finding.held)
 
+    @property
+    def law_failure(self) -> str:
+        """What the law under test did wrong by itself (raised, hung, gave NaN ...); empty where it ran."""
+        return next((str(item.value) for item in self.failures if item.metric == LAW_CLAUSE), "")
+
     def summary(self) -> dict[str, object]:
         """The case as JSON values."""
         return {
@@ -161,8 +170,10 @@ class Tester:
         Raises:
             InputError: It cannot be flown.
         """
-        if self._plant is not None:
-            scenario = dataclasses.replace(scenario, plant=self._plant)
+        # Tests judge by the flight corridor, with laws and without, unless the scenario names another.
+        scenario = dataclasses.replace(
+            scenario, plant=self._plant or scenario.plant, corridor=scenario.corridor or TEST_CORRIDOR
+        )
         if scenario.trial is None:
             return self._flight_case(scenario)
         return self._trial_case(scenario, scenario.trial)
@@ -171,10 +182,9 @@ class Tester:
         begin = time.perf_counter()
         law = self._law or trial.law
         law_chain(law, self._folder)
-        corridor = scenario.corridor or "flight"
-        key = (scenario.plant, corridor, scenario.rate_hz)
+        key = (scenario.plant, scenario.corridor_name, scenario.rate_hz)
         if key not in self._benches:
-            self._benches[key] = Bench(plant=scenario.plant, corridor=corridor, rate_hz=scenario.rate_hz)
+            self._benches[key] = Bench(plant=scenario.plant, corridor=scenario.corridor_name, rate_hz=scenario.rate_hz)
         bench = self._benches[key]
         plan = plan_of(scenario)
         off = bench.fly(plan, "off", keep=True)
@@ -205,10 +215,14 @@ class Tester:
         begin = time.perf_counter()
         overrides = Overrides(plant=scenario.plant, protection=self._law)
         record = fly(scenario, speed="max", overrides=overrides)
+        asked = {clause.name: clause for clause in scenario.expectations}
         findings = []
         for item in record.verdicts:
+            clause = asked.get(item.name)
+            metric = "completed" if clause is None else clause.metric
+            words = _words(item.limit) if clause is None else _limit_words(clause)
             value = None if item.value is None else float(item.value)
-            findings.append(Finding(item.name, item.name, item.held, value, _words(item.limit)))
+            findings.append(Finding(item.name, metric, item.held, value, words))
         return Case(
             scenario=record.scenario,
             law=record.scenario.protection,
@@ -262,7 +276,7 @@ def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
     """
     trial = scenario.trial
     return Case(
-        scenario=scenario,
+        scenario=dataclasses.replace(scenario, corridor=scenario.corridor or TEST_CORRIDOR),
         law=law or (trial.law if trial is not None else scenario.protection),
         kind=trial.kind if trial is not None else "flight",
         findings=(),
@@ -279,7 +293,9 @@ def _law_findings(flown: TrialFlight) -> list[Finding]:
     """A law that failed has failed the test, whatever the flight looks like."""
     found: Sequence[str] = flown.law_problems
     return [
-        Finding("the law runs without failing", "law", not found, "; ".join(found) if found else "ran", "no failure")
+        Finding(
+            "the law runs without failing", LAW_CLAUSE, not found, "; ".join(found) if found else "ran", "no failure"
+        )
     ]
 
 
@@ -337,13 +353,16 @@ def _flight_findings(scenario: Scenario, rows: FloatArray) -> list[Finding]:
     found = []
     for clause in scenario.expectations:
         value = metrics.value(clause.metric)
-        words = _words(clause.limit)
-        if clause.minimum is None:
-            words = f"<= {words}"
-        elif clause.maximum is None:
-            words = f">= {words}"
-        found.append(Finding(clause.name, clause.metric, clause.holds(value), value, words))
+        found.append(Finding(clause.name, clause.metric, clause.holds(value), value, _limit_words(clause)))
     return found
+
+
+def _limit_words(clause: Expectation) -> str:
+    """What a clause of ``[[expect]]`` allows, such as ``<= 1``."""
+    words = _words(clause.limit)
+    if clause.minimum is None:
+        return f"<= {words}"
+    return f">= {words}" if clause.maximum is None else words
 
 
 def _words(limit: float | bool | list[float]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -55,7 +56,7 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
         laws.append(("off", "off"))
     for place, law in laws:
         scenario: Scenario = dataclasses.replace(
-            case.scenario, protection=law, corridor=case.scenario.corridor or "flight", expectations=()
+            case.scenario, protection=law, corridor=case.scenario.corridor_name, expectations=()
         )
         path = part / f"{place}.parquet"
         record = fly(scenario, speed="max", outputs=FlightOutputs(log=path))
@@ -69,7 +70,8 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
 
 
 def _commands(case: Case, logs: dict[str, Any]) -> list[str]:
-    commands = [f"rtsim test scenario.toml --protection {case.law}"]
+    law = shlex.quote(case.law)
+    commands = [f"rtsim test scenario.toml --protection {law} --plant {case.scenario.plant}"]
     return commands + [f"rtsim replay {item['log']}" for item in logs.values()]
 
 

@@ -26,7 +26,7 @@ class JunitCase:
     failures: Sequence[str] = ()
     """Clauses that did not hold, as ``metric=value want limit``."""
     error: str = ""
-    """What kept it from being judged."""
+    """What kept it from being judged, or what broke in the code under test; wins over failures."""
 
 
 def junit_xml(name: str, cases: Sequence[JunitCase]) -> bytes:
@@ -59,7 +59,8 @@ def junit_xml(name: str, cases: Sequence[JunitCase]) -> bytes:
             for key, value in case.properties.items():
                 ET.SubElement(properties, "property", {"name": _text(key), "value": _value(value)})
         if case.error:
-            ET.SubElement(element, "error", {"message": _text(case.error), "type": "error"}).text = _text(case.error)
+            words = "\n".join([case.error, *case.failures])
+            ET.SubElement(element, "error", {"message": _text(case.error), "type": "error"}).text = _text(words)
         elif case.failures:
             words = "\n".join(case.failures)
             ET.SubElement(
@@ -67,7 +68,7 @@ def junit_xml(name: str, cases: Sequence[JunitCase]) -> bytes:
             ).text = _text(words)
     ET.indent(root)
     document: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
-    return document
+    return document + b"\n"
 
 
 def _value(value: object) -> str:

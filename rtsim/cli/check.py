@@ -1,4 +1,4 @@
-"""``rtsim check``: validates scenario files, stick maps and databases without flying them."""
+"""``rtsim check``: validates scenario and campaign files, stick maps and databases without flying them."""
 
 from __future__ import annotations
 
@@ -26,12 +26,13 @@ def register(app: typer.Typer) -> None:
 
 def check_command(
     files: Annotated[
-        list[str], typer.Argument(help="Scenarios and stick maps (.toml), library names, databases (.nc, .mat).")
+        list[str],
+        typer.Argument(help="Scenarios, campaigns, stick maps (.toml), library names, databases (.nc, .mat)."),
     ],
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Validate scenario files, stick maps and databases; every mistake is one sentence, exit 2 where there is any.
+    """Validate scenario and campaign files, stick maps, databases; every mistake is one sentence, exit 2 for any.
 
     Args:
         files: What to check.
@@ -77,8 +78,13 @@ def file_problems(name: str) -> list[str]:
         return [
             str(InputError("is no kind of file that rtsim reads", file=name, allowed=", ".join(choices), mend=mend))
         ]
-    if suffix == ".toml" and _is_stick_map(Path(name)):
-        return _stick_map_problems(name)
+    if suffix == ".toml":
+        keys = _top_keys(Path(name))
+        # Scenarios have neither key.
+        if "kind" in keys:
+            return _stick_map_problems(name)
+        if "classes" in keys:
+            return _campaign_problems(name)
     problems = scenario_problems(name)
     if not problems:
         from scenarios.loader import load_scenario
@@ -89,13 +95,19 @@ def file_problems(name: str) -> list[str]:
     return [str(problem) for problem in problems]
 
 
-def _is_stick_map(path: Path) -> bool:
-    """Whether a TOML file says that it is a stick map; scenarios have no ``kind``."""
+def _top_keys(path: Path) -> set[str]:
+    """Keys of a TOML file, which tell what it is; none where it cannot be read."""
     try:
         with path.open("rb") as file:
-            return "kind" in tomllib.load(file)
+            return set(tomllib.load(file))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
-        return False  # the scenario reader tells what is wrong
+        return set()  # the scenario reader tells what is wrong
+
+
+def _campaign_problems(name: str) -> list[str]:
+    from scenarios.campaign.spec import parse_campaign
+
+    return [str(problem) for problem in parse_campaign(Path(name).read_text(encoding="utf-8"), file=name)[1]]
 
 
 def _stick_map_problems(name: str) -> list[str]:

@@ -16,12 +16,11 @@ from typing import Annotated
 import typer
 
 from rtsim import __version__
-from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError
+from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError, Terminated
 
 EXIT_INTERNAL_ERROR = 70
 EXIT_BROKEN_PIPE = 141
 EXIT_INTERRUPTED = 130
-EXIT_TERMINATED = 143
 
 COMMAND_MODULES = (
     "fly",
@@ -40,13 +39,6 @@ COMMAND_MODULES = (
     "joystick",
 )
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
-
-
-class Terminated(SystemExit):
-    """SIGTERM arrived: unwinds like Ctrl-C, so that files are closed, and ends with exit code 143."""
-
-    def __init__(self) -> None:
-        super().__init__(EXIT_TERMINATED)
 
 
 def database_hash() -> str:

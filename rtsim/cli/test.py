@@ -126,6 +126,7 @@ def _flown(scenarios: list[Scenario], protection: str | None, plant: PlantName |
 
 
 def _write_junit(cases: list[Case], path: Path) -> None:
+    from scenarios.verdict import LAW_CLAUSE
     from scenarios.verdict_junit import JunitCase, junit_xml
 
     document = junit_xml(
@@ -139,12 +140,13 @@ def _write_junit(cases: list[Case], path: Path) -> None:
                     "law": case.law,
                     "kind": case.kind,
                     "plant": case.scenario.plant,
+                    "corridor": case.scenario.corridor_name,
                     "seed": case.scenario.seed,
                     **case.metrics,
                     **{f"off.{name}": value for name, value in case.off_metrics.items()},
                 },
-                failures=[item.sentence for item in case.failures],
-                error=case.error,
+                failures=[item.sentence for item in case.failures if item.metric != LAW_CLAUSE],
+                error=case.error or case.law_failure,
             )
             for case in cases
         ],
@@ -170,14 +172,24 @@ def _print(cases: list[Case]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(caption="kn outside the corridor at the deepest, with the law and without", caption_justify="left")
-    for heading in ("scenario", "kind", "law", "verdict", "with [kn]", "off [kn]"):
-        table.add_column(heading, overflow="fold", no_wrap=heading in {"scenario", "kind"})
+    # No frame, and a law that all have in common said once: rows fit 80 columns and the lines of a pipe.
+    laws = {case.law for case in cases}
+    if len(laws) == 1:
+        results.print(f"law under test: {cases[0].law}", markup=False, soft_wrap=True)
+    caption = "kn outside the corridor at the deepest, with the law and without"
+    table = Table(box=None, pad_edge=False, caption=caption, caption_justify="left")
+    table.add_column("scenario", no_wrap=True)
+    table.add_column("kind", no_wrap=True)
+    if len(laws) > 1:
+        table.add_column("law", overflow="ellipsis", no_wrap=True)
+    table.add_column("verdict", no_wrap=True)
+    for heading in ("with [kn]", "off [kn]"):
+        table.add_column(heading, justify="right", no_wrap=True)
     for case in cases:
         table.add_row(
             case.name,
             case.kind,
-            case.law,
+            *([case.law] if len(laws) > 1 else []),
             Text(
                 *{"passed": ("passed", "green"), "failed": ("FAILED", "red"), "error": ("ERROR", "red")}[case.verdict]
             ),
@@ -187,7 +199,8 @@ def _print(cases: list[Case]) -> None:
     for case in cases:
         words = [case.error] if case.error else [f"{item.name}: {item.sentence}" for item in case.failures]
         for word in words:
-            results.print(f"{case.name}: {word}", markup=False)
+            # Whole lines: whoever reads a pipe looks for them, and terminals wrap by themselves.
+            results.print(f"{case.name}: {word}", markup=False, soft_wrap=True)
     failed = sum(case.verdict != "passed" for case in cases)
     results.print(f"{len(cases) - failed} of {len(cases)} passed")
 

@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import math
 import signal
+import sys
 import threading
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from numbers import Real
 from types import FrameType
-from typing import Literal, Self, cast
+from typing import Any, Literal, Self, cast
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.errors import Terminated
+from rtsim.protection.laws import CHANNELS
 
+TraceFunction = Callable[[FrameType, str, Any], Any]
+
+KINDS = ("warn", "limit", "reverse", "blend", "clip")
+"""How a law may say it acted."""
 Failure = Literal["raised", "not_finite", "wrong_answer", "interrupted"]
 
 
@@ -36,7 +45,12 @@ class GuardedAnswer:
 
 
 class CallLimit:
-    """Interrupts whatever runs inside the ``with`` block after a time, where the system can: main thread, POSIX."""
+    """Interrupts whatever runs inside the ``with`` block after a time, where the system can: main thread, POSIX.
+
+    Code that swallows the interruption (``except:`` inside a loop) is interrupted again every 0.1 s, each time one
+    more line after it was swallowed, until that hits a line outside its ``try``. Only a call into C that never comes
+    back cannot be ended.
+    """
 
     def __init__(self, seconds: float) -> None:
         """Set the limit.
@@ -49,11 +63,13 @@ class CallLimit:
         self._previous: object = None
         self._rest = (0.0, 0.0)
         self._began = 0.0
+        self._interruptions = 0
+        self._trace: Any = None
 
     def __enter__(self) -> Self:
         self._armed = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
         if self._armed:
-            self._began = time.monotonic()
+            self._began, self._interruptions, self._trace = time.monotonic(), 0, sys.gettrace()
             self._previous = signal.signal(signal.SIGALRM, self._interrupt)
             # Repeats, for a law that catches everything.
             self._rest = signal.setitimer(signal.ITIMER_REAL, self._seconds, 0.1)
@@ -62,6 +78,8 @@ class CallLimit:
     def __exit__(self, *exception: object) -> None:
         if not self._armed:
             return
+        if self._interruptions > 0:
+            sys.settrace(self._trace)
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, self._previous)  # type: ignore[arg-type]
         if self._rest[0] > 0.0:
@@ -69,9 +87,28 @@ class CallLimit:
             left = max(1e-3, self._rest[0] - (time.monotonic() - self._began))
             signal.setitimer(signal.ITIMER_REAL, left, self._rest[1])
 
-    @staticmethod
-    def _interrupt(number: int, frame: FrameType | None) -> None:
-        del number, frame
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        del number
+        leaving = CallLimit.__exit__.__code__
+        if frame is not None and frame.f_code is leaving:
+            return
+        self._interruptions += 1
+        lines = self._interruptions
+
+        def after_some_lines(frame: FrameType, event: str, argument: object) -> TraceFunction | None:
+            del argument
+            nonlocal lines
+            if frame.f_code is leaving:
+                return None
+            lines -= event == "line"
+            if lines == 0:
+                raise LawInterruptedError
+            return after_some_lines
+
+        sys.settrace(after_some_lines)
+        while frame is not None and frame.f_code is not guarded_call.__code__:
+            frame.f_trace = after_some_lines
+            frame = frame.f_back
         raise LawInterruptedError
 
 
@@ -92,17 +129,22 @@ def guarded_call(
     failure: Failure | None = None
     text = ""
     answer: object = None
+    given = (replace(sensors), replace(command), replace(margins))
     try:
         with CallLimit(limit):
-            answer = law.step(sensors, command, margins, dt)
+            answer = law.step(*given, dt)
     except LawInterruptedError:
         failure, text = "interrupted", f"took more than {limit:g} s in one call"
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything
-        failure, text = "raised", f"raised {type(error).__name__}: {error}"
+    except (KeyboardInterrupt, Terminated):
+        raise  # from whoever runs rtsim
+    except BaseException as error:  # noqa: BLE001 - a user's own code may raise anything
+        failure, text = "raised", f"raised {_words(error)}"
     duration = time.perf_counter() - began
     if failure is None and duration > limit:
         # Where no alarm can be set the call is judged when it comes back.
         failure, text = "interrupted", f"took {duration:.2f} s in one call, more than {limit:g} s"
+    if failure is None and given != (sensors, command, margins):
+        failure, text = "wrong_answer", "changed what it was given; its command must be a new one"
     if failure is not None:
         return GuardedAnswer(None, (), failure, text, duration)
     return _checked(answer, duration)
@@ -114,13 +156,47 @@ def _checked(answer: object, duration: float) -> GuardedAnswer:
         command = Command(float(limited.stick), float(limited.lever), float(limited.nacelle_rate))
         listed = tuple(interventions)
     except (TypeError, ValueError, AttributeError):
-        shown = repr(answer)
+        shown = _shown(answer)
         shown = shown if len(shown) <= 80 else f"{shown[:77]}..."
         text = f"answered {shown} where (Command, list of Intervention) is asked for"
         return GuardedAnswer(None, (), "wrong_answer", text, duration)
-    if not all(isinstance(item, Intervention) for item in listed):
-        text = "gave a list of interventions that holds something else"
-        return GuardedAnswer(None, (), "wrong_answer", text, duration)
+    for item in listed:
+        odd = _odd_intervention(item)
+        if odd:
+            return GuardedAnswer(None, (), "wrong_answer", f"gave a list of interventions that holds {odd}", duration)
     if not math.isfinite(command.stick + command.lever + command.nacelle_rate):
         return GuardedAnswer(None, (), "not_finite", f"gave a command that is not finite: {command}", duration)
     return GuardedAnswer(command, listed, None, "", duration)
+
+
+def _odd_intervention(item: Any) -> str:
+    """What is wrong with what should be an intervention; empty where nothing is."""
+    if not isinstance(item, Intervention):
+        return f"something else: {_shown(item)}"
+    if not isinstance(item.limit, str):
+        return f"limit={_shown(item.limit)}, which is no name"
+    for name, allowed in (("channel", CHANNELS), ("kind", KINDS)):
+        value: object = getattr(item, name)
+        if not isinstance(value, str) or value not in allowed:
+            return f"{name}={_shown(value)} where one of {', '.join(allowed)} is asked for"
+    for name in ("before", "after", "margin", "time_to_limit"):
+        if not isinstance(getattr(item, name), Real):
+            return f"{name}={_shown(getattr(item, name))}, which is no number"
+    return ""
+
+
+def _words(error: BaseException) -> str:
+    """An error for people, whatever its own ``str`` does."""
+    try:
+        said = str(error)
+    except Exception:  # noqa: BLE001 - a user's own code may raise anything
+        said = ""
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+
+
+def _shown(value: object) -> str:
+    """A value for people, whatever its own ``repr`` does."""
+    try:
+        return repr(value)
+    except Exception:  # noqa: BLE001 - a user's own code may raise anything
+        return f"a {type(value).__name__}"

@@ -262,6 +262,8 @@ def _find(name: str) -> Callable[[], ProtectionLaw]:
 
 def _from_module(name: str) -> Any:
     module_name, _, class_name = name.partition(":")
+    if not (module_name and class_name):
+        raise InputError("is half a name", key="--protection", value=name, mend="write MODULE:CLASS")
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.insert(0, here)
@@ -276,7 +278,7 @@ def _from_module(name: str) -> Any:
             value=name,
             mend="name a module of the current directory or an installed one" if own else f"install {missing}",
         ) from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(
             f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
             key="--protection",

@@ -12,6 +12,7 @@ import numpy as np
 
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
+from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.laws import LawSpec, load_laws
 from rtsim.protection.tables import LAW_NAMES
 from rtsim.units import kt
@@ -147,18 +148,19 @@ def fly_law(
     if law.compiled:
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
-        return bench.fly(plan, _python_laws(law.name, folder), repeat=repeat, keep=keep)
+        return bench.fly(plan, _python_laws(law.name, folder, bench.corridor), repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
 
 
-def law_chain(name: str, folder: str) -> Sequence[LawSpec]:
+def law_chain(name: str, folder: str, boundary: BoundaryName = "flight") -> Sequence[LawSpec]:
     """Find a law, or several separated by commas.
 
     Args:
         name: What the user wrote.
         folder: Where modules are looked for besides the installed ones.
+        boundary: Corridor that built-in laws of a chain keep to.
 
     Raises:
         InputError: There is no such law.
@@ -167,12 +169,12 @@ def law_chain(name: str, folder: str) -> Sequence[LawSpec]:
 
     if folder and folder not in sys.path:
         sys.path.insert(0, folder)
-    return load_laws(name)
+    return load_laws(name, boundary=boundary)
 
 
 @functools.lru_cache(maxsize=8)
-def _python_laws(name: str, folder: str) -> Sequence[LawSpec]:
-    return law_chain(name, folder)
+def _python_laws(name: str, folder: str, boundary: BoundaryName) -> Sequence[LawSpec]:
+    return law_chain(name, folder, boundary)
 
 
 @functools.lru_cache(maxsize=4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import warnings
 from collections.abc import Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
 from rtsim.errors import InputError, OutputError
@@ -46,6 +47,9 @@ class LocalExecutor:
         Args:
             task: The campaign.
             chunks: The pieces.
+
+        Raises:
+            OutputError: A worker process died.
         """
         if self._jobs == 1 or len(chunks) <= 1:
             for chunk in chunks:
@@ -54,10 +58,17 @@ class LocalExecutor:
         from joblib import Parallel, delayed
 
         # Waves instead of one long list: what is finished can be kept, and the end can come early.
-        with Parallel(n_jobs=self._jobs, batch_size=1) as workers:
-            size = WAVE * self._jobs
-            for begin in range(0, len(chunks), size):
-                yield from workers(delayed(fly_chunk)(task, chunk) for chunk in chunks[begin : begin + size])
+        # Each piece is given on as it comes: what is finished is kept even if the rest of its wave is not.
+        try:
+            with Parallel(n_jobs=self._jobs, batch_size=1, return_as="generator") as workers:
+                size = WAVE * self._jobs
+                for begin in range(0, len(chunks), size):
+                    yield from workers(delayed(fly_chunk)(task, chunk) for chunk in chunks[begin : begin + size])
+        except BrokenProcessPool as error:
+            raise OutputError(
+                "a worker process died: memory ran out, somebody ended it, or the law under test ended its process; "
+                "with --out FOLDER the same command goes on where it stopped."
+            ) from error
 
 
 class DaskExecutor:

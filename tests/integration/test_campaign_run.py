@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from rtsim.errors import InputError, OutputError
-from scenarios.campaign.chunks import plan_chunks
+from scenarios.campaign.chunks import Chunk, plan_chunks
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.executors import DaskExecutor, LocalExecutor
-from scenarios.campaign.run import CampaignOptions, run_campaign
+from scenarios.campaign.run import CampaignOptions, make_task, run_campaign
 from scenarios.campaign.spec import parse_campaign
 from scenarios.campaign.trial import Bench
 
@@ -57,6 +57,11 @@ class Sometimes:
         if sensors.nacelle_angle < 1.2:
             raise RuntimeError("cannot do that")
         return command, []
+
+class EndsTheProcess(Sometimes):
+    def step(self, sensors, command, margins, dt):
+        import os
+        os._exit(0)
 """
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
 
@@ -271,3 +276,37 @@ def test_a_wrong_key_in_a_campaign_is_an_error():
         spec, problems = parse_campaign(CAMPAIGN.replace(old, new), file="small.toml")
         assert spec is None
         assert words in str(problems[0])
+
+
+def test_a_worker_process_that_dies_is_told_in_a_sentence(tmp_path):
+    (tmp_path / "mylaws.py").write_text(BREAKING, encoding="utf-8")
+    (tmp_path / "small.toml").write_text(CAMPAIGN, encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, "-m", "rtsim", "campaign", "small.toml", "--jobs", "2", "--protection",
+         "mylaws:EndsTheProcess"],
+        capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path,
+    )  # fmt: skip
+    assert ended.returncode == 4, ended.stderr
+    assert "a worker process died" in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_finished_pieces_are_given_on_before_their_wave_has_ended():
+    """What is finished is kept, though a piece of the same wave may never come."""
+    spec, text = campaign()
+    task = make_task(spec, text, options=CampaignOptions(), file="small.toml")
+    pieces = plan_chunks(spec, 20)
+    work = LocalExecutor(2).fly(task, [pieces[0], Chunk(99, 0, 1)])
+    assert next(work).chunk == pieces[0]
+    with pytest.raises(IndexError):
+        next(work)
+
+
+def test_check_reads_campaign_files(tmp_path):
+    (tmp_path / "small.toml").write_text(CAMPAIGN, encoding="utf-8")
+    (tmp_path / "wrong.toml").write_text(CAMPAIGN.replace("rate_max", "rate_mex"), encoding="utf-8")
+    command = [sys.executable, "-m", "rtsim", "check", "small.toml", "wrong.toml"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert "small.toml: good" in ended.stdout
+    assert "wrong.toml: expect[0].rate_mex" in ended.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import subprocess
@@ -55,6 +56,24 @@ class Sleeps(Good):
     def step(self, sensors, command, margins, dt):
         if 1.0 < sensors.time < 1.3:
             time.sleep(0.05)
+        return command, []
+
+class Stubborn(Good):
+    def step(self, sensors, command, margins, dt):
+        while sensors.time > 1.0:
+            try:
+                time.sleep(0.5)
+            except BaseException:
+                pass
+        return command, []
+
+class Odd(Good):
+    def step(self, sensors, command, margins, dt):
+        raise GeneratorExit("no Exception")
+
+class Changes(Good):
+    def step(self, sensors, command, margins, dt):
+        object.__setattr__(command, "stick", 0.3)
         return command, []
 
 CALLS = []
@@ -130,11 +149,17 @@ def test_a_failure_is_told_and_can_be_replayed(folder):
         ("NotANumber", "not finite"),
         ("Sleeps", "took longer than its period"),
         ("Global", "keeps state outside"),
+        ("Stubborn", "took more than 1 s in one call"),
+        ("Odd", "raised GeneratorExit: no Exception"),
+        ("Changes", "changed what it was given"),
     ],
 )
 def test_a_law_that_breaks_is_named(folder, law, words):
-    ended = run(folder, "mine.toml", "--protection", f"mylaws:{law}", "--json")
+    ended = run(folder, "mine.toml", "--protection", f"mylaws:{law}", "--junit", "j.xml", "--json")
     assert ended.returncode == 1, ended.stderr
+    suite = ET.parse(folder / "j.xml").getroot()
+    assert (suite.get("errors"), suite.get("failures")) == ("1", "0")
+    assert words in suite.find(".//error").get("message")
     case = json.loads(ended.stdout.splitlines()[-1])["cases"][0]
     said = next(text for text in case["failures"] if text.startswith("law="))
     assert words in said, said
@@ -169,3 +194,48 @@ def test_other_mistakes_have_their_exit_codes(folder):
     assert run(folder, "mine.toml", "--protection", "fulll").returncode == 2
     assert run(folder, "manual_flight").returncode in {0, 2}
     assert run(folder, "mine.toml", "--junit", "nowhere/j.xml").returncode == 4
+
+
+def test_tests_judge_by_the_flight_corridor_whatever_the_law(folder):
+    ended = run(folder, "typical_conversion", "mine.toml", "--protection", "off", "--json")
+    cases = json.loads(ended.stdout.splitlines()[-1])["cases"]
+    assert [case["corridor_name"] for case in cases] == ["flight", "flight"]
+    flown = {item["metric"] for item in cases[0]["expectations"]}
+    assert {"completed", "corridor.exceedances"} <= flown
+
+
+def test_the_bundle_of_a_flight_without_a_trial_replays(folder):
+    text = TRIAL[: TRIAL.index("[[pulses]]")]
+    text += '[[expect]]\nname = "cannot hold"\nmetric = "pitch_deg.max"\nmax = -80\n'
+    (folder / "flight.toml").write_text(text, encoding="utf-8")
+    ended = run(folder, "flight.toml", "--out", "bundles", "--json")
+    case = json.loads(ended.stdout.splitlines()[-1])["cases"][0]
+    assert ended.returncode == 1
+    assert case["failures"][0].endswith("want <= -80")
+    assert case["failures"][0].startswith("pitch_deg.max=")
+    verdict = json.loads((Path(folder / case["bundle"]) / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["logs"]["law"]["same_as_judged"]
+
+
+def test_the_table_fits_80_columns_and_keeps_words_whole(folder):
+    ended = run(folder, "mine.toml", "ep20_nominal_reconversion_turbulence")
+    table = ended.stdout.splitlines()
+    assert max(map(len, table)) <= 80
+    row = next(line for line in table if line.startswith("ep20"))
+    assert row.split()[:3] == ["ep20_nominal_reconversion_turbulence", "nominal", "passed"]
+
+
+def test_a_module_that_ends_the_process_is_bad_input(folder):
+    (folder / "ending.py").write_text("raise SystemExit(3)\n", encoding="utf-8")
+    ended = run(folder, "mine.toml", "--protection", "ending:Law")
+    assert ended.returncode == 2
+    assert "cannot be imported" in ended.stderr
+
+
+def test_the_report_shows_why_the_law_acted(folder):
+    run(folder, "mine.toml", "--html", "r.html")
+    page = (folder / "r.html").read_text(encoding="utf-8")
+    picture = base64.b64decode(re.search(r"base64,([^']+)'", page).group(1)).decode()
+    for words in ("corridor margin [kn]", "share of limit", "law acts"):
+        assert words in picture, words
+    assert "corridor flight" in page
