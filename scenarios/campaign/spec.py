@@ -17,11 +17,35 @@ from rtsim.errors import InputError
 from scenarios.problems import closest, explain, suggestion
 from scenarios.scenario import CorridorName
 from scenarios.verdict_events import EVENTS
+from scenarios.verdict_trial import LARGEST_LEVER, LARGEST_STICK
 
 Generator = np.random.Generator
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 MAX_FILE_BYTES = 1_000_000
 """A campaign file larger than this is refused [bytes]."""
+
+
+LARGEST_SWITCH_DEG_S = 12.0
+"""Largest nacelle rate that a switch may ask for [deg/s]."""
+RANGES: dict[str, tuple[float, float]] = {
+    "nacelle_deg": (0.0, 90.0),
+    "target_deg": (0.0, 90.0),
+    "rate_deg_s": (0.0, 12.0),
+    "acceleration_kt_s": (0.0, 20.0),
+    "begin_s": (0.0, 3600.0),
+    "time_s": (0.0, 3600.0),
+    "duration_s": (0.0, 3600.0),
+    "gap_s": (0.0, 3600.0),
+    "period_s": (0.05, 600.0),
+    "count": (0.0, 1000.0),
+    "reaction_s": (0.0, 3600.0),
+    "bias_kt": (-100.0, 100.0),
+    "turbulence_kt": (0.0, 100.0),
+    "wind_kt": (-100.0, 100.0),
+    "ahead_kt": (-200.0, 200.0),
+    "below_kt": (-200.0, 200.0),
+}
+"""What numbers and the certain part of distributions must lie in, by key."""
 
 
 class Strict(BaseModel):
@@ -275,6 +299,7 @@ def _contradictions(spec: CampaignFile, file: str) -> list[InputError]:
         if names.index(item.name) != number:
             found.append(InputError("is used twice", file=file, key=f"{key}.name", value=item.name))
         found += [InputError(problem, file=file, key=f"{key}{place}", mend=mend) for place, problem, mend in _odd(item)]
+        found += _number_problems(item, key, file)
     for number, clause in enumerate(spec.expect):
         key = f"expect[{number}]"
         if clause.event not in EVENTS:
@@ -320,3 +345,61 @@ def _odd(item: ClassTable) -> list[tuple[str, str, str]]:
         if (fault.bias_kt is None) == (fault.kind == "airspeed-bias"):
             found.append((f".faults[{number}].bias_kt", "belongs to airspeed-bias, and only there", "correct it"))
     return found
+
+
+def _number_problems(
+    table: BaseModel, key: str, file: str, *, limits: tuple[float, float] | None = None
+) -> list[InputError]:
+    """Distributions that are none, and numbers that mean nothing, in a table and what it holds."""
+    if isinstance(table, Uniform | Normal | Choice):
+        return _distribution_problems(table, key, file) or _range_problems(_extremes(table), key, file, limits)
+    found: list[InputError] = []
+    for name in type(table).model_fields:
+        value, place = getattr(table, name), f"{key}.{name}"
+        allowed = RANGES.get(name)
+        if isinstance(table, PulseDraw) and name == "amount":
+            largest = {"stick": LARGEST_STICK, "lever": LARGEST_LEVER}.get(table.channel, LARGEST_SWITCH_DEG_S)
+            allowed = (-largest, largest)
+        if isinstance(value, BaseModel):
+            found += _number_problems(value, place, file, limits=allowed)
+        elif isinstance(value, list):
+            for number, part in enumerate(value):
+                if isinstance(part, BaseModel):
+                    found += _number_problems(part, f"{place}[{number}]", file)
+        elif isinstance(value, float | int) and not isinstance(value, bool):
+            found += _range_problems([value], place, file, allowed)
+    return found
+
+
+def _extremes(number: Uniform | Normal | Choice) -> list[float]:
+    """What is certain to be drawn or nearly; the tails of a normal distribution are not."""
+    if isinstance(number, Uniform):
+        return number.uniform
+    return number.normal[:1] if isinstance(number, Normal) else number.choice
+
+
+def _distribution_problems(number: Uniform | Normal | Choice, key: str, file: str) -> list[InputError]:
+    if isinstance(number, Uniform) and number.uniform[0] > number.uniform[1]:
+        return [InputError("ends before it begins", file=file, key=f"{key}.uniform", value=number.uniform, mend="swap")]
+    if isinstance(number, Normal) and number.normal[1] < 0.0:
+        mend = "give mean and standard deviation"
+        return [InputError("has a negative deviation", file=file, key=f"{key}.normal", value=number.normal, mend=mend)]
+    if isinstance(number, Choice) and number.weights is not None:
+        weights, place = number.weights, f"{key}.weights"
+        if len(weights) != len(number.choice):
+            mend = f"give {len(number.choice)}, one for each choice"
+            return [InputError("does not fit choice", file=file, key=place, value=weights, mend=mend)]
+        if sum(weights) <= 0.0:
+            return [InputError("are all 0", file=file, key=place, value=weights, mend="give one a weight above 0")]
+    return []
+
+
+def _range_problems(values: list[float], key: str, file: str, limits: tuple[float, float] | None) -> list[InputError]:
+    if limits is None:
+        return []
+    low, high = limits
+    return [
+        InputError("is out of range", file=file, key=key, value=value, allowed=f"{low:g} to {high:g}")
+        for value in values
+        if not low <= value <= high
+    ][:1]

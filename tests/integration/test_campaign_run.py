@@ -310,3 +310,22 @@ def test_check_reads_campaign_files(tmp_path):
     assert ended.returncode == 2
     assert "small.toml: good" in ended.stdout
     assert "wrong.toml: expect[0].rate_mex" in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("uniform = [30, 70]", "uniform = [70, 30]", "classes[0].start.airspeed_kt.uniform"),
+        ("{ uniform = [30, 70] }", "{ normal = [50, -5] }", "classes[0].start.airspeed_kt.normal"),
+        ("{ uniform = [30, 70] }", "{ choice = [50, 60], weights = [1] }", "classes[0].start.airspeed_kt.weights"),
+        ("{ uniform = [30, 70] }", "{ choice = [50, 60], weights = [0, 0] }", "classes[0].start.airspeed_kt.weights"),
+        ("uniform = [78, 88]", "uniform = [100, 190]", "classes[0].start.nacelle_deg"),
+        ("uniform = [-7.5, -4]", "uniform = [-75, -4]", "classes[0].pulses[0].amount"),
+        ("time_s = 2", "time_s = -2", "classes[1].gusts[0].time_s"),
+    ],
+)
+def test_distributions_that_mean_nothing_are_named(old, new, key):
+    spec, problems = parse_campaign(CAMPAIGN.replace(old, new), file="small.toml")
+    assert spec is None
+    assert [problem.key for problem in problems] == [key]
+    assert problems[0].file == "small.toml"
