@@ -177,13 +177,13 @@ def _print(cases: list[Case]) -> None:
     if len(laws) == 1:
         results.print(f"law under test: {cases[0].law}", markup=False, soft_wrap=True)
     caption = "kn outside the corridor at the deepest, with the law and without"
-    table = Table(box=None, pad_edge=False, caption=caption, caption_justify="left")
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), caption=caption, caption_justify="left")
     table.add_column("scenario", no_wrap=True)
     table.add_column("kind", no_wrap=True)
     if len(laws) > 1:
         table.add_column("law", overflow="ellipsis", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
-    for heading in ("with [kn]", "off [kn]"):
+    for heading in ("kn out", "off"):
         table.add_column(heading, justify="right", no_wrap=True)
     for case in cases:
         table.add_row(
