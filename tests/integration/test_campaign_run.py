@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 from rtsim.errors import InputError, OutputError
-from scenarios.campaign.chunks import Chunk, plan_chunks
+from scenarios.campaign.chunks import plan_chunks
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.executors import DaskExecutor, LocalExecutor
-from scenarios.campaign.run import CampaignOptions, make_task, run_campaign
+from scenarios.campaign.run import CampaignOptions, run_campaign
 from scenarios.campaign.spec import parse_campaign
 from scenarios.campaign.trial import Bench
 
@@ -289,17 +289,6 @@ def test_a_worker_process_that_dies_is_told_in_a_sentence(tmp_path):
     assert ended.returncode == 4, ended.stderr
     assert "a worker process died" in ended.stderr
     assert "Traceback" not in ended.stderr
-
-
-def test_finished_pieces_are_given_on_before_their_wave_has_ended():
-    """What is finished is kept, though a piece of the same wave may never come."""
-    spec, text = campaign()
-    task = make_task(spec, text, options=CampaignOptions(), file="small.toml")
-    pieces = plan_chunks(spec, 20)
-    work = LocalExecutor(2).fly(task, [pieces[0], Chunk(99, 0, 1)])
-    assert next(work).chunk == pieces[0]
-    with pytest.raises(IndexError):
-        next(work)
 
 
 def test_check_reads_campaign_files(tmp_path):
