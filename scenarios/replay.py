@@ -165,9 +165,10 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
         simulation.set_protection_override(bool(event.data["on"]))
         return
     if event.kind == "law":
-        if simulation.laws is not None:
-            change = simulation.laws.end if event.data["ended"] else simulation.laws.skip
-            change(str(event.data["law"]))
+        if simulation.laws is not None and event.data["ended"]:
+            simulation.laws.end(str(event.data["law"]))
+        elif simulation.laws is not None and event.data["what"] == "skipped":
+            simulation.laws.skip(str(event.data["law"]))
         return
     if event.kind in DISTURBANCE_KINDS:
         simulation.disturb(disturbance_from_event(event.kind, event.data))

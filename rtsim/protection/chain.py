@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
@@ -24,7 +24,9 @@ LIVE_LIMIT = 0.25
 """The same in a live flight, where the loop waits meanwhile [s]."""
 OTHER_REASON = float(len(LIMIT_KINDS) + 1)
 """Recorded reason of an intervention whose limit is none of ``LIMIT_KINDS``."""
-EventKind = Literal["raised", "not_finite", "wrong_answer", "interrupted", "skipped", "global_state"]
+RANGES = ((-1.0, 1.0), (0.0, 1.0), (-math.inf, math.inf))
+"""What stick, lever and nacelle rate can be; the nacelles' own rate limits act later."""
+EventKind = Literal["raised", "not_finite", "wrong_answer", "interrupted", "skipped", "global_state", "out_of_range"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +121,7 @@ class LawChain:
         self._laws: list[ProtectionLaw | None] = []
         self._waiting: list[int] = []
         self._calls: list[list[_Call]] = []
+        self._clipped: list[bool] = []
         self._held: list[float | None] = [None, None, None]
         self.reset()
 
@@ -127,6 +130,7 @@ class LawChain:
         self._laws = [spec.make() for spec in self._specs]
         self._waiting = [0] * len(self._specs)
         self._calls = [[] for _ in self._specs]
+        self._clipped = [False] * len(self._specs)
         self._held = [None, None, None]
         self.interventions, self.reasons = (), (0.0, 0.0, 0.0)
 
@@ -276,9 +280,24 @@ class LawChain:
             return None
         if self.live and answer.duration > self.period:
             self._waiting[place] = math.ceil(answer.duration / self.period) - 1
+        if answer.command is not None:
+            answer = self._in_range(frame, place, answer, answer.command)
         if self.remember and answer.command is not None:
             self._calls[place].append(_Call(sensors, command, margins, answer.command))
         return answer
+
+    def _in_range(self, frame: int, place: int, answer: GuardedAnswer, command: Command) -> GuardedAnswer:
+        """Clip what no control can do, and say so once in a flight."""
+        given = _values(command)
+        clipped = tuple(min(max(value, low), high) for value, (low, high) in zip(given, RANGES, strict=True))
+        if clipped == given:
+            return answer
+        if not self._clipped[place]:
+            self._clipped[place] = True
+            name = self._specs[place].name
+            text = f"the law {name} asks for stick {given[0]:g} and lever {given[1]:g}; clipped to -1 to 1 and 0 to 1"
+            self._tell(LawEvent(frame, name, "out_of_range", text, False))
+        return replace(answer, command=Command(*clipped))
 
     def _fail(self, frame: int, name: str, kind: Failure, text: str) -> None:
         sentence = f"the law {name} {text}; the flight goes on without it"

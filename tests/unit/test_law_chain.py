@@ -58,6 +58,10 @@ class Exits:
     def step(self, sensors, command, margins, dt):
         sys.exit(3)
 
+class TooMuch:
+    def step(self, sensors, command, margins, dt):
+        return Command(50.0, -3.0, command.nacelle_rate), []
+
 class NotANumber:
     def step(self, sensors, command, margins, dt):
         return Command(float("nan"), command.lever, command.nacelle_rate), []
@@ -234,6 +238,13 @@ def test_a_replay_skips_and_ends_what_was_skipped_and_ended():
     )
     ended = fly(chain("Slower"), 15, before=lambda laws, frame: frame == 10 and laws.end("chained_laws:Slower"))
     assert [command.nacelle_rate for command in ended] == [-0.05] * 10 + [-0.1] * 5
+
+
+def test_what_no_control_can_do_is_clipped_and_the_law_named_once():
+    laws = chain("TooMuch")
+    assert all(command == Command(1.0, 0.0, PILOT.nacelle_rate) for command in fly(laws, 16))
+    assert [(event.kind, event.frame, event.ended) for event in laws.events] == [("out_of_range", 0, False)]
+    assert "asks for stick 50 and lever -3" in laws.events[0].text
 
 
 def test_a_law_that_keeps_global_state_is_named():
