@@ -193,7 +193,7 @@ class LimitWatch:
                 name = _CHANNELS[place][0]
                 data = {"channel": name, "limit": reasons[place]}
                 self._say(
-                    row, "protection", f"protection acts on the {name}: {_limit(reasons[place])}", "caution", data
+                    row, "protection", f"{name} protected: {_limit(reasons[place])}", "caution", data
                 )
 
     def _let_go(self, began: int) -> None:

@@ -41,16 +41,16 @@ LIMIT_KINDS: tuple[LimitKind, ...] = (
 )
 """Limits by name; the number of a limit is its place here, and a recorded reason is that number plus one."""
 LIMIT_WORDS: dict[str, str] = {
-    "stall_attitude": "the corridor's low-speed side",
-    "load_torque": "the corridor's high-speed side",
-    "downstop_gate": "the downstop gate",
-    "nacelle_range": "the nacelles' range",
-    "nacelle_rate": "the nacelle rate",
+    "stall_attitude": "low-speed side of the corridor",
+    "load_torque": "high-speed side of the corridor",
+    "downstop_gate": "downstop gate",
+    "nacelle_range": "nacelle range",
+    "nacelle_rate": "nacelle rate",
     "flap_stop": "flapping",
     "mast_torque": "mast torque",
     "load_factor": "load factor",
     "pitch_attitude": "pitch attitude",
-    "consistency": "the aircraft's own trims",
+    "consistency": "aircraft's own trims",
     "sink": "sink rate",
     "time_to_limit": "time to the corridor's boundary",
 }

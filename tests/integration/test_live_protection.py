@@ -63,7 +63,7 @@ def test_limits_and_interventions_are_told_alike_at_any_speed() -> None:
     events = told(quick, "limit", "protection")
     assert events == told(paced, "limit", "protection")
     assert events == sorted(events, key=lambda event: event[0])
-    assert any("protection acts on the nacelles: the corridor's high-speed side" in text for _, text in events)
+    assert any("nacelles protected: high-speed side of the corridor" in text for _, text in events)
     assert any("mast torque warning" in text for _, text in events)
     assert quick.summary()["limits"] == paced.summary()["limits"]
     assert quick.history_sha256 == paced.history_sha256
@@ -96,14 +96,14 @@ def test_without_protection_nobody_watches() -> None:
 def test_an_episode_of_protection_ends() -> None:
     flight = scenarios.fly("ep04_wrong_nacelle_command", speed="max", overrides=Overrides(protection="governor"))
     texts = [text for _, text in told(flight, "protection")]
-    assert texts[0].startswith("protection acts on the nacelles: the corridor's low-speed side")
+    assert texts[0].startswith("nacelles protected: low-speed side of the corridor")
     assert any(text.startswith("protection has let go after") for text in texts)
     acted = flight["protection_nacelle_reason"] != 0.0
     found = flight.summary()["interventions"]
     assert found["nacelles_s"] == pytest.approx(np.count_nonzero(acted) * 0.004)
     assert found["stick_s"] == found["lever_s"] == 0.0
     assert found["episodes"] == 1 + sum(
-        "let go" in earlier and "acts" in later for earlier, later in itertools.pairwise(texts)
+        "let go" in earlier and "protected" in later for earlier, later in itertools.pairwise(texts)
     )
 
 
@@ -178,5 +178,5 @@ def test_the_law_of_the_documentation_flies(tmp_path: Path, monkeypatch: pytest.
     flight = scenarios.fly("ep04_wrong_nacelle_command", speed="max", overrides=overrides)
     bare = scenarios.fly("ep04_wrong_nacelle_command", speed="max", overrides=Overrides(protection="monitor"))
     assert told(flight, "law") == []
-    assert "protection acts on the nacelles: the corridor's low-speed side" in {event.text for event in flight.events}
+    assert "nacelles protected: low-speed side of the corridor" in {event.text for event in flight.events}
     assert flight["nacelle_deg"].min() > bare["nacelle_deg"].min() + 10.0
