@@ -20,6 +20,7 @@ CONSTANTS = (
     "rtsim/faults/fault.py",
     "rtsim/frame.py",
     "rtsim/protection/law_data.py",
+    "rtsim/simulation_data.py",
     "rtsim/units.py",
 )
 """Modules besides ``*_kernels.py`` whose contents become part of compiled code."""

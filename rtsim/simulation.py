@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -19,32 +19,29 @@ from rtsim.faults import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply, fault_nacelle_ok
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.observation_kernels import observe
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import L_OVERRIDE
 from rtsim.protection.laws import load_laws
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
+from rtsim.simulation_data import (
+    CLOCK_END,
+    CLOCK_FLAGS,
+    CLOCK_FRAME,
+    CLOCK_MODE,
+    CLOCK_SINK,
+    END_NONE,
+    END_REASONS,
+    MODES,
+    PilotMode,
+    SimulationState,
+)
 from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
 from rtsim.units import DEGREE, INCH_POUND, KNOT
 
-PilotMode = Literal["mocm", "external", "hold"]
-MODES: dict[PilotMode, int] = {
-    "mocm": kernels.MODE_MOCM,
-    "external": kernels.MODE_EXTERNAL,
-    "hold": kernels.MODE_HOLD,
-}
-"""Pilot modes by name, with their number in the ``pilot_mode`` column."""
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
-END_REASONS = {
-    kernels.END_NONE: "",
-    kernels.END_CRASH: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
-    kernels.END_ATTITUDE: "control was lost: pitch attitude beyond 80 deg",
-    kernels.END_NOT_FINITE: "the model diverged: a state is no longer a finite number",
-    kernels.END_GENTLE_LANDING: "touched down gently, sinking at {sink:.1f} m/s",
-    kernels.END_HARD_LANDING: "landed hard, sinking at {sink:.1f} m/s",
-}
-"""Why a flight ended by itself, by the code in the simulation's clock."""
 
 __all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
 
@@ -53,7 +50,7 @@ __all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "P
 class Snapshot:
     """All state of a simulation at the start of a frame."""
 
-    state: kernels.SimulationState
+    state: SimulationState
     """Copies of every array the frame changes."""
     random_stream: dict[str, Any]
     """State of the generators of pilot noise and turbulence, and the noise drawn for this frame."""
@@ -101,7 +98,7 @@ class Simulation:
     @property
     def frame_index(self) -> int:
         """Number of the frame that starts now."""
-        return int(self._state.clock[kernels.CLOCK_FRAME])
+        return int(self._state.clock[CLOCK_FRAME])
 
     @property
     def time(self) -> float:
@@ -111,18 +108,18 @@ class Simulation:
     @property
     def finished(self) -> bool:
         """The flight ended by itself; ``end_reason`` says why."""
-        return bool(self._state.clock[kernels.CLOCK_END] != kernels.END_NONE)
+        return bool(self._state.clock[CLOCK_END] != END_NONE)
 
     @property
     def end_reason(self) -> str:
         """Why the flight ended by itself; empty while it has not."""
         clock = self._state.clock
-        return END_REASONS[int(clock[kernels.CLOCK_END])].format(sink=float(clock[kernels.CLOCK_SINK]))
+        return END_REASONS[int(clock[CLOCK_END])].format(sink=float(clock[CLOCK_SINK]))
 
     @property
     def mode(self) -> PilotMode:
         """Who flies."""
-        number = int(self._state.clock[kernels.CLOCK_MODE])
+        number = int(self._state.clock[CLOCK_MODE])
         return next(name for name, value in MODES.items() if value == number)
 
     @property
@@ -133,7 +130,7 @@ class Simulation:
     @property
     def outside_grid(self) -> int:
         """Flags of the last LPV step: 0 inside the grid, else bits as in ``rtsim.lpv.lpv_kernels``."""
-        return int(self._state.clock[kernels.CLOCK_FLAGS])
+        return int(self._state.clock[CLOCK_FLAGS])
 
     def warm_up(self) -> None:
         """Compile or load every kernel of the frame; the state stays untouched."""
@@ -297,7 +294,7 @@ class Simulation:
         if mode == "mocm" and self.mode != "mocm":
             self._observe()
             kernels.engage_pilot(self.tables, self._state, self._scratch)
-        self._state.clock[kernels.CLOCK_MODE] = MODES[mode]
+        self._state.clock[CLOCK_MODE] = MODES[mode]
         if self._observed:
             self._row[COLUMN.pilot_mode] = MODES[mode]
 
@@ -333,7 +330,7 @@ class Simulation:
         fault_apply(
             state.faults, fault_change(fault, on=on, time=self.time), state.x, state.nacelle, frequency, airspeed
         )
-        kernels.observe(self.tables, state, self._scratch, self._row)
+        observe(self.tables, state, self._scratch, self._row)
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air or let something fail or mend, from now on.
@@ -413,7 +410,7 @@ class Simulation:
             "air": self._air_random.bit_generator.state,
         }
         laws = self.laws.snapshot() if self.laws is not None else None
-        return Snapshot(kernels.SimulationState(*(array.copy() for array in self._state)), noise_state, laws)
+        return Snapshot(SimulationState(*(array.copy() for array in self._state)), noise_state, laws)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot; what follows is bit-equal to what followed it the first time.
@@ -428,13 +425,13 @@ class Simulation:
         self._noise[:] = np.asarray(snapshot.random_stream["drawn"])
         if self.laws is not None and snapshot.laws is not None:
             self.laws.restore(snapshot.laws)
-        kernels.observe(self.tables, self._state, self._scratch, self._row)
+        observe(self.tables, self._state, self._scratch, self._row)
         self._observed = True
 
     def _observe(self) -> FloatArray:
         if not self._observed:
             if self._noise_width:
                 self._noise[:] = self._random.standard_normal(self._noise_width)
-            kernels.observe(self.tables, self._state, self._scratch, self._row)
+            observe(self.tables, self._state, self._scratch, self._row)
             self._observed = True
         return self._row

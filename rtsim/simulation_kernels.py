@@ -8,67 +8,43 @@ same three calls in a compiled loop, so that a flight stepped from Python and on
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
-from rtsim.aids.aids_kernels import LAST_SWITCHES, AidTables, aids_step
-from rtsim.aircraft import dynamics_kernels as nonlinear
+from rtsim.aids.aids_kernels import LAST_SWITCHES, aids_step
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
-from rtsim.aircraft.tables import AircraftTables
-from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, G_Q, G_U, G_W, GustTables, gust_step
+from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, gust_step
 from rtsim.compiled import inner_kernel, kernel
-from rtsim.corridor.corridor_kernels import CorridorTables, corridor_level_step, corridor_margins
-from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
-from rtsim.faults.fault_kernels import (
-    FaultTables,
-    fault_actuators_begin,
-    fault_actuators_end,
-    fault_airspeed_error,
-    fault_mask,
-    fault_nacelle_ok,
-    fault_nacelle_rate,
-    fault_update,
-)
-from rtsim.frame import COLUMN
-from rtsim.lpv.lpv_kernels import LpvTables
-from rtsim.nacelle.automatic_kernels import AutomaticTables, automatic_advance, automatic_rate
-from rtsim.nacelle.nacelle_kernels import (
-    NacelleTables,
-    nacelle_advance,
-    nacelle_assigned_rate,
-    nacelle_at,
-    nacelle_effective_rate,
-    nacelle_path,
-    on_downstop,
-)
-from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance_in, mocm_engage, mocm_output_in
-from rtsim.plant_kernels import AircraftFrame, plant_outputs, plant_step
+from rtsim.corridor.corridor_kernels import corridor_level_step
+from rtsim.faults.fault_kernels import fault_actuators_begin, fault_actuators_end, fault_nacelle_rate, fault_update
+from rtsim.frame import COLUMN, FloatArray
+from rtsim.nacelle.automatic_kernels import automatic_advance
+from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
+from rtsim.observation_kernels import observe, programme_at, sense
+from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_engage, mocm_output_in
+from rtsim.plant_kernels import plant_step
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_due, protect
 from rtsim.ramp_filter_kernels import critically_damped_ramp
-from rtsim.units import (
-    DEGREE,
-    HORSEPOWER,
-    INCH_POUND,
-    KNOT,
-    POUND_FORCE,
-    RPM,
+from rtsim.simulation_data import (
+    CLOCK_DISTANCE,
+    CLOCK_END,
+    CLOCK_FLAGS,
+    CLOCK_FRAME,
+    CLOCK_MODE,
+    CLOCK_SINK,
+    END_ATTITUDE,
+    END_CRASH,
+    END_GENTLE_LANDING,
+    END_HARD_LANDING,
+    END_NONE,
+    END_NOT_FINITE,
+    MODE_EXTERNAL,
+    MODE_MOCM,
+    Scratch,
+    SimulationState,
+    SimulationTables,
 )
+from rtsim.units import DEGREE, KNOT
 
-FloatArray = npt.NDArray[np.float64]
-
-MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
-
-# Places in SimulationState.clock.
-CLOCK_FRAME, CLOCK_MODE, CLOCK_DISTANCE, CLOCK_FLAGS, CLOCK_END, CLOCK_SINK = 0, 1, 2, 3, 4, 5
-CLOCK_SIZE = 6
-# Places in SimulationState.reference: unfiltered airspeed command is a function of time and not kept.
-REFERENCE_AIRSPEED, REFERENCE_RATE = 0, 1
-REFERENCE_SIZE = 2
-# Why a flight ended by itself.
-END_NONE, END_CRASH, END_ATTITUDE, END_NOT_FINITE, END_GENTLE_LANDING, END_HARD_LANDING = 0, 1, 2, 3, 4, 5
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
 """Sink rates at touchdown up to which a landing counts as gentle or as hard [m/s]; beyond it is a crash. Ours: about
 300 and 600 ft/min, the usual normal and limit touchdown rates of helicopters (14 CFR 29.725 drops at 6.5 ft/s)."""
@@ -77,259 +53,6 @@ LANDING_NACELLE = 60.0 * DEGREE
 """Below this nacelle angle the proprotors (12.5 ft radius) would strike the ground."""
 LANDING_SPEED = 60.0 * KNOT
 LARGEST_PITCH = 80.0 * DEGREE
-# The array handed to the pilot, see rtsim.pilot.pilot_kernels.
-TARGET_SIZE = 5
-
-
-class SimulationTables(NamedTuple):
-    """Everything the frame reads and never writes."""
-
-    dt: float
-    """Length of a frame [s]."""
-    wind: float
-    """Tailwind [m/s]."""
-    lpv: LpvTables
-    """The LPV aircraft."""
-    aircraft: AircraftTables | AircraftFrame
-    """The nonlinear aircraft where it flies; else what the frame reads of it."""
-    nacelle: NacelleTables
-    """Conversion actuator."""
-    automatic: AutomaticTables
-    """Automatic nacelle control; where active, it sets the nacelle rate whoever flies."""
-    corridor: CorridorTables
-    """Boundaries and levels."""
-    pilot: PilotTables
-    """The MOCM's gains and references."""
-    aids: AidTables
-    """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
-    bare aircraft, nor on controls that are held."""
-    gusts: GustTables
-    """Parameters of gusts and turbulence."""
-    faults: FaultTables
-    """Failures and their times."""
-    protection: law.ProtectionTables
-    """The compiled protection law; it acts after the aids, on what would move the controls."""
-    programme: FloatArray
-    """Rows: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
-    reference_frequency: float
-    """Natural frequency of the critically damped airspeed reference filter [rad/s]."""
-
-
-class SimulationState(NamedTuple):
-    """Everything the frame changes; a snapshot is a copy of these arrays and of the random stream."""
-
-    x: FloatArray
-    """Aircraft state."""
-    u: FloatArray
-    """Inputs that acted last."""
-    nacelle: FloatArray
-    """Actuator: command angle, angle, rate."""
-    automatic: FloatArray
-    """Automatic nacelle control: filtered airspeed, rate commanded last, whether it has begun."""
-    reference: FloatArray
-    """Filtered airspeed reference and its rate."""
-    level: FloatArray
-    """Corridor level timers."""
-    pilot: FloatArray
-    """State of the MOCM."""
-    aids: FloatArray
-    """State of the pilot aids."""
-    switches: FloatArray
-    """Which aids are on."""
-    gusts: FloatArray
-    """Turbulence filters, gusts that act or are to come, and what acts now."""
-    faults: FloatArray
-    """Which failures are active."""
-    protection: FloatArray
-    """State of the protection law."""
-    clock: FloatArray
-    """Frame number, pilot mode, distance flown [m], LPV flags, end code, sink rate at the end [m/s]."""
-
-
-class Scratch(NamedTuple):
-    """Work space; holds nothing from one frame to the next."""
-
-    work: FloatArray
-    """Work array of the plant kernels."""
-    y: FloatArray
-    """Plant outputs."""
-    xdot: FloatArray
-    """Plant state derivative."""
-    path: FloatArray
-    """Nacelle motion over the frame, shape (3, 3)."""
-    motion: FloatArray
-    """Nacelle angle, rate, acceleration now."""
-    margins: FloatArray
-    """Corridor margins."""
-    shown: FloatArray
-    """What the airspeed indicator shows [m/s], then the corridor margins that go with it."""
-    seen: FloatArray
-    """Aircraft state as pilot and aids see it: with the indicated airspeed."""
-    target: FloatArray
-    """What the pilot is asked for."""
-    command: FloatArray
-    """Stick, lever, nacelle rate that are to act."""
-    hands: FloatArray
-    """The pilot's stick and lever, before the aids."""
-    pilot: FloatArray
-    """Work array of the pilot kernels."""
-    asked: FloatArray
-    """The pilot's command in a compiled run: stick, lever, nacelle rate."""
-    planned: FloatArray
-    """Where failed actuators stand after the frame."""
-    gust: FloatArray
-    """Gust of the next frame in body axes."""
-    sensors: FloatArray
-    """What the protection law may know."""
-    limited: FloatArray
-    """Stick, lever, nacelle rate as the law leaves them."""
-    law: FloatArray
-    """Work array of the law."""
-
-
-@inner_kernel
-def programme_at(programme: FloatArray, row: int, time: float) -> float:
-    """Value of one row of the programme, linear between its points and held after the last.
-
-    Args:
-        programme: The programme's points, shape (4, points).
-        row: 1 airspeed, 2 nacelle angle, 3 altitude.
-        time: Time [s].
-    """
-    last = programme.shape[1] - 1
-    if time >= programme[0, last]:
-        return programme[row, last]
-    low = 0
-    high = last
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if programme[0, middle] <= time:
-            low = middle
-        else:
-            high = middle
-    if last == 0:
-        return programme[row, 0]
-    share = (time - programme[0, low]) / (programme[0, high] - programme[0, low])
-    return programme[row, low] + share * (programme[row, high] - programme[row, low])
-
-
-@inner_kernel
-def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
-    """Fill the row with all that is known before the command of this frame; changes no state.
-
-    Args:
-        tables: The simulation.
-        state: Its state at the start of the frame.
-        scratch: Work space; afterwards holds outputs, margins and the pilot's target.
-        row: Written: the frame row, commands excepted.
-    """
-    x = state.x
-    gusts = state.gusts
-    frame = state.clock[CLOCK_FRAME]
-    time = frame * tables.dt
-    nacelle_at(tables.nacelle, state.nacelle, 0.0, 0.0, scratch.motion)
-    angle, rate = scratch.motion[0], scratch.motion[1]
-    state.u[INPUT.nacelle_rate] = rate
-    state.u[INPUT.nacelle_acceleration] = scratch.motion[2]
-    state.u[INPUT.gust_u] = gusts[G_U]
-    state.u[INPUT.gust_w] = gusts[G_W]
-    state.u[INPUT.gust_q] = gusts[G_Q]
-    plant_outputs(tables.aircraft, tables.lpv, x, state.u, angle, (scratch.y, scratch.xdot, scratch.work))
-    st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
-    through = x[STATE.u] * ct + x[STATE.w] * st
-    airspeed = through + gusts[G_AHEAD]
-    climb = x[STATE.u] * st - x[STATE.w] * ct
-    corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
-    _see(tables, state, scratch, airspeed)
-    y = scratch.y
-    rotor_speed = tables.aircraft.configuration.rotor_speed
-    power = 2.0 * y[OUTPUT.torque] * rotor_speed
-
-    target = scratch.target
-    target[0] = state.reference[REFERENCE_AIRSPEED]
-    target[1] = state.reference[REFERENCE_RATE]
-    target[2] = programme_at(tables.programme, 3, time)
-    ahead = programme_at(tables.programme, 3, time + tables.dt)
-    target[3] = (ahead - target[2]) / tables.dt
-    wanted = programme_at(tables.programme, 2, time + tables.dt)
-    wanted_rate = (wanted - state.nacelle[0]) / tables.dt
-    if tables.automatic.active != 0:
-        wanted_rate = automatic_rate(
-            tables.automatic, state.automatic, scratch.shown[0], y[OUTPUT.airspeed_rate], state.nacelle[0], tables.dt
-        )
-    target[4] = nacelle_assigned_rate(tables.nacelle, wanted_rate)
-
-    row[COLUMN.frame] = frame
-    row[COLUMN.time_s] = time
-    row[COLUMN.airspeed_kt] = airspeed / KNOT
-    row[COLUMN.airspeed_reference_kt] = target[0] / KNOT
-    row[COLUMN.nacelle_deg] = angle / DEGREE
-    row[COLUMN.nacelle_reference_deg] = state.nacelle[0] / DEGREE
-    row[COLUMN.altitude_m] = x[STATE.altitude]
-    row[COLUMN.pitch_deg] = x[STATE.pitch] / DEGREE
-    row[COLUMN.flapping_deg] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2) / DEGREE
-    row[COLUMN.nacelle_rate_deg_s] = rate / DEGREE
-    row[COLUMN.airspeed_command_kt] = programme_at(tables.programme, 1, time) / KNOT
-    row[COLUMN.altitude_reference_m] = target[2]
-    row[COLUMN.airspeed_rate_kt_s] = y[OUTPUT.airspeed_rate] / KNOT
-    row[COLUMN.ground_speed_kt] = (through + tables.wind) / KNOT
-    row[COLUMN.climb_rate_m_s] = climb
-    row[COLUMN.distance_m] = state.clock[CLOCK_DISTANCE]
-    row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(through), 1.0)) / DEGREE
-    row[COLUMN.angle_of_attack_deg] = (
-        math.atan2(x[STATE.w] + gusts[G_W] + 4.5 * st, x[STATE.u] + gusts[G_U] + 4.5 * ct) / DEGREE
-    )
-    row[COLUMN.pitch_rate_deg_s] = x[STATE.q] / DEGREE
-    row[COLUMN.body_u_m_s] = x[STATE.u]
-    row[COLUMN.body_w_m_s] = x[STATE.w]
-    row[COLUMN.load_factor] = y[OUTPUT.load_factor]
-    row[COLUMN.coning_deg] = x[STATE.coning] / DEGREE
-    row[COLUMN.longitudinal_flapping_deg] = x[STATE.flap_1c] / DEGREE
-    row[COLUMN.lateral_flapping_deg] = x[STATE.flap_1s] / DEGREE
-    row[COLUMN.collective_75_deg] = x[STATE.collective_75] / DEGREE
-    row[COLUMN.cyclic_deg] = x[STATE.cyclic_1s] / DEGREE
-    row[COLUMN.elevator_deg] = x[STATE.elevator] / DEGREE
-    speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
-    row[COLUMN.flap_deg] = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle) / DEGREE
-    row[COLUMN.thrust_per_rotor_lb] = y[OUTPUT.thrust] / POUND_FORCE
-    row[COLUMN.power_shp] = power / HORSEPOWER
-    row[COLUMN.engine_power_shp] = power / HORSEPOWER / TRANSMISSION_EFFICIENCY
-    row[COLUMN.mast_torque_inlb] = y[OUTPUT.torque] / INCH_POUND
-    row[COLUMN.rotor_speed_rpm] = rotor_speed / RPM
-    row[COLUMN.margin_kt] = min(scratch.margins[0], scratch.margins[1]) / KNOT
-    row[COLUMN.margin_low_kt] = scratch.margins[0] / KNOT
-    row[COLUMN.margin_high_kt] = scratch.margins[1] / KNOT
-    row[COLUMN.nacelle_forward_deg] = scratch.margins[2] / DEGREE
-    row[COLUMN.nacelle_aft_deg] = scratch.margins[3] / DEGREE
-    row[COLUMN.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
-    row[COLUMN.pilot_mode] = state.clock[CLOCK_MODE]
-    row[COLUMN.airspeed_indicated_kt] = scratch.shown[0] / KNOT
-    row[COLUMN.gust_u_m_s] = gusts[G_U]
-    row[COLUMN.gust_w_m_s] = gusts[G_W]
-    row[COLUMN.gust_q_deg_s] = gusts[G_Q] / DEGREE
-    row[COLUMN.failures] = float(fault_mask(state.faults))
-
-
-@inner_kernel
-def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, airspeed: float) -> None:
-    """Fill what pilots and laws are shown: indicated airspeed, its margins, and the state shifted to agree with it.
-
-    The shift is along the horizon, so that the climb rate computed from the seen state stays the true one.
-    """
-    x, seen, shown = state.x, scratch.seen, scratch.shown
-    error = fault_airspeed_error(state.faults, airspeed)
-    shown[0] = airspeed + error
-    if error == 0.0:
-        for k in range(scratch.margins.shape[0]):
-            shown[1 + k] = scratch.margins[k]
-    else:
-        corridor_margins(tables.corridor, shown[0], scratch.motion[0], shown[1:])
-    for k in range(x.shape[0]):
-        seen[k] = x[k]
-    shift = state.gusts[G_AHEAD] + error
-    if shift != 0.0:
-        seen[STATE.u] += shift * math.cos(x[STATE.pitch])
-        seen[STATE.w] += shift * math.sin(x[STATE.pitch])
 
 
 @inner_kernel
@@ -398,34 +121,6 @@ def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, ap
         acting[2] = scratch.target[4]
     else:
         acting[2] = nacelle_assigned_rate(tables.nacelle, applied[2])
-
-
-@inner_kernel
-def sense(state: SimulationState, scratch: Scratch, row: FloatArray, sensors: FloatArray) -> None:
-    """Give what a protection law may know, the numbers of ``Simulation.sensors``.
-
-    Args:
-        state: The simulation's state.
-        scratch: Its work space as ``observe`` left it.
-        row: The frame's row as ``observe`` left it.
-        sensors: Written, shape (SENSOR_COUNT,), SI.
-    """
-    x = state.x
-    sensors[law.SENSE_TIME] = row[COLUMN.time_s]
-    sensors[law.SENSE_AIRSPEED] = row[COLUMN.airspeed_indicated_kt] * KNOT
-    sensors[law.SENSE_AIRSPEED_RATE] = row[COLUMN.airspeed_rate_kt_s] * KNOT
-    sensors[law.SENSE_NACELLE] = scratch.motion[0]
-    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[1]
-    sensors[law.SENSE_PITCH] = x[STATE.pitch]
-    sensors[law.SENSE_PITCH_RATE] = x[STATE.q]
-    sensors[law.SENSE_FLIGHT_PATH] = row[COLUMN.flight_path_deg] * DEGREE
-    sensors[law.SENSE_ALTITUDE] = x[STATE.altitude]
-    sensors[law.SENSE_CLIMB_RATE] = row[COLUMN.climb_rate_m_s]
-    sensors[law.SENSE_LOAD_FACTOR] = row[COLUMN.load_factor]
-    sensors[law.SENSE_TORQUE] = row[COLUMN.mast_torque_inlb] * INCH_POUND
-    sensors[law.SENSE_FLAPPING] = row[COLUMN.flapping_deg] * DEGREE
-    sensors[law.SENSE_DOWNSTOP] = row[COLUMN.on_downstop]
-    sensors[law.SENSE_NACELLE_OK] = 1.0 if fault_nacelle_ok(state.faults) else 0.0
 
 
 @inner_kernel

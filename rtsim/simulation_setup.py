@@ -26,6 +26,7 @@ from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
+from rtsim.observation_kernels import observe
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.plant_kernels import AircraftFrame
@@ -36,6 +37,16 @@ from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
+from rtsim.simulation_data import (
+    CLOCK_MODE,
+    CLOCK_SIZE,
+    MODE_EXTERNAL,
+    MODE_MOCM,
+    TARGET_SIZE,
+    Scratch,
+    SimulationState,
+    SimulationTables,
+)
 from rtsim.units import to_deg, to_kt
 
 Plant = Literal["lpv", "lpv-plain", "nonlinear"]
@@ -93,9 +104,9 @@ class FlightSetup:
 class Parts:
     """Tables and work space of one simulation."""
 
-    tables: kernels.SimulationTables
+    tables: SimulationTables
     """Parameters of the frame."""
-    scratch: kernels.Scratch
+    scratch: Scratch
     """Work space of the frame."""
     noise_width: int
     """Standard normals the pilot takes per frame; 0 with the noise off."""
@@ -144,7 +155,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     x[STATE.altitude] = altitude
     programme = setup.programme
     own = nonlinear_aircraft.tables
-    tables = kernels.SimulationTables(
+    tables = SimulationTables(
         dt=1.0 / setup.rate_hz,
         wind=float(setup.wind),
         lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
@@ -168,7 +179,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
     states = len(STATES)
     work = max(work_size(tables.lpv), nonlinear.WORK_COUNT + 6 * states)
-    scratch = kernels.Scratch(
+    scratch = Scratch(
         work=np.zeros(work),
         y=np.zeros(len(OUTPUTS)),
         xdot=np.zeros(states),
@@ -177,7 +188,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         margins=np.zeros(MARGIN_COUNT),
         shown=np.zeros(1 + MARGIN_COUNT),
         seen=np.zeros(states),
-        target=np.zeros(kernels.TARGET_SIZE),
+        target=np.zeros(TARGET_SIZE),
         command=np.zeros(3),
         hands=np.zeros(2),
         pilot=np.zeros(pilot_work_size(tables.pilot)),
@@ -198,7 +209,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
-def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> kernels.SimulationState:
+def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> SimulationState:
     """The state at frame 0: trimmed, filters at rest, the pilot engaged without a step.
 
     Args:
@@ -207,11 +218,11 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> ke
         air_normals: Three standard normals: the turbulence at the start.
     """
     airspeed, nacelle, _ = _start(setup)
-    clock = np.zeros(kernels.CLOCK_SIZE)
-    clock[kernels.CLOCK_MODE] = kernels.MODE_MOCM if setup.pilot == "mocm" else kernels.MODE_EXTERNAL
+    clock = np.zeros(CLOCK_SIZE)
+    clock[CLOCK_MODE] = MODE_MOCM if setup.pilot == "mocm" else MODE_EXTERNAL
     u = parts.start_u.copy()
     u[INPUT.nacelle_rate :] = 0.0
-    state = kernels.SimulationState(
+    state = SimulationState(
         x=parts.start_x.copy(),
         u=u,
         nacelle=new_actuator_state(nacelle),
@@ -231,7 +242,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> ke
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
     kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))
     row = np.zeros(len(COLUMN))
-    kernels.observe(parts.tables, state, parts.scratch, row)
+    observe(parts.tables, state, parts.scratch, row)
     kernels.engage_pilot(parts.tables, state, parts.scratch)
     return state
 

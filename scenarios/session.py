@@ -15,7 +15,7 @@ from rtsim.faults import fault_events
 from rtsim.frame import SIGNAL_COUNT, FloatArray
 from rtsim.protection.chain import LawEvent
 from rtsim.simulation import END_REASONS, Disturbance, Simulation
-from rtsim.simulation_kernels import END_GENTLE_LANDING
+from rtsim.simulation_data import END_GENTLE_LANDING
 from scenarios.disturbances import disturbance_event
 from scenarios.hands import Hands, pilot_modes
 from scenarios.nacelle_laws import NacelleLawFactory, NacelleLawGuard

@@ -21,7 +21,7 @@ from rtsim.optimization import merit_kernels as kernels
 from rtsim.optimization.figures import FlightFigures, figures_from_sums
 from rtsim.programme import Programme
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
-from rtsim.simulation_kernels import CLOCK_END, END_NONE, Scratch
+from rtsim.simulation_data import CLOCK_END, END_NONE, Scratch
 from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
 
 CHUNK_FRAMES = 2_048

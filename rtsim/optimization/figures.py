@@ -10,7 +10,7 @@ import numpy as np
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.optimization import merit_kernels as places
-from rtsim.simulation_kernels import END_NONE
+from rtsim.simulation_data import END_NONE
 from rtsim.units import HORSEPOWER
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from rtsim.compiled import batch_kernel, inner_kernel
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.simulation_kernels import (
+from rtsim.observation_kernels import observe
+from rtsim.simulation_data import (
     CLOCK_END,
     CLOCK_MODE,
     END_NONE,
@@ -16,10 +17,8 @@ from rtsim.simulation_kernels import (
     Scratch,
     SimulationState,
     SimulationTables,
-    advance,
-    observe,
-    pilot_command,
 )
+from rtsim.simulation_kernels import advance, pilot_command
 from rtsim.units import STICK_HALF_TRAVEL_IN
 
 # Places of the sums and extremes in the array of one flight.

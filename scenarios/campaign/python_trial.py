@@ -11,9 +11,11 @@ import numpy as np
 from rtsim import simulation_kernels as simulation
 from rtsim.command import Command, Margins, Pilot, Reference, Sensors
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.observation_kernels import sense
 from rtsim.protection import law_data
 from rtsim.protection.chain import LawChain
 from rtsim.protection.limits import LIMIT_KINDS
+from rtsim.simulation_data import CLOCK_END, CLOCK_FRAME, END_NONE, Scratch
 from rtsim.units import DEGREE
 from scenarios.campaign import trial_kernels as kernels
 from scenarios.script_kernels import script_command
@@ -49,12 +51,12 @@ def fly_in_python(flying: Flying, laws: LawChain | None, pilot: Pilot | None) ->
     command, sensors = scratch.asked, np.zeros(law_data.SENSOR_COUNT)
     slow = 0
     for k in range(len(flying.rows)):
-        if state.clock[simulation.CLOCK_END] != simulation.END_NONE:
+        if state.clock[CLOCK_END] != END_NONE:
             return k, slow
         row = flying.rows[k]
         kernels.ask_pilot(tables, state, scratch, row, asked_of_pilot, command)
         if pilot is not None:
-            simulation.sense(state, scratch, row, sensors)
+            sense(state, scratch, row, sensors)
             asked = pilot.step(sensors_object(sensors), _reference(flying, scratch), tables.dt)
             command[:] = asked.stick, asked.lever, asked.nacelle_rate
             script_command(script[0], script[1], float(row[COLUMN.time_s]), command)
@@ -64,7 +66,7 @@ def fly_in_python(flying: Flying, laws: LawChain | None, pilot: Pilot | None) ->
         else:
             simulation.shape(tables, state, scratch, command)
             if laws.due(k):
-                simulation.sense(state, scratch, row, sensors)
+                sense(state, scratch, row, sensors)
             began = time.perf_counter()
             _ask_laws(laws, k, sensors, scratch, row)
             slow += time.perf_counter() - began > laws.period
@@ -87,7 +89,7 @@ def sensors_object(values: FloatArray) -> Sensors:
     )
 
 
-def _ask_laws(laws: LawChain, frame: int, sensors: FloatArray, scratch: simulation.Scratch, row: FloatArray) -> None:
+def _ask_laws(laws: LawChain, frame: int, sensors: FloatArray, scratch: Scratch, row: FloatArray) -> None:
     """Ask the chain where it is due, limit what would act, and note who changed what and why."""
     asked = Command(*scratch.command.tolist())
     if laws.due(frame):
@@ -110,8 +112,8 @@ NO_PREDICTION = 6.0
 """Time to limit where nobody predicts it: the horizon of the monitor [s]."""
 
 
-def _reference(flying: Flying, scratch: simulation.Scratch) -> Reference:
-    now = float(flying.state.clock[simulation.CLOCK_FRAME]) * flying.tables.dt
+def _reference(flying: Flying, scratch: Scratch) -> Reference:
+    now = float(flying.state.clock[CLOCK_FRAME]) * flying.tables.dt
     target = scratch.target.tolist()
     return Reference(
         airspeed=target[0],

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rtsim import simulation_kernels as simulation
 from rtsim.aircraft.signals import STATE
 from rtsim.atmosphere import AirSpecification
 from rtsim.atmosphere.air import gust_tables, normals_needed
@@ -27,6 +26,14 @@ from rtsim.protection.limits import load_limits
 from rtsim.protection.tables import law_tables
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 from rtsim.simulation import END_REASONS
+from rtsim.simulation_data import (
+    CLOCK_END,
+    CLOCK_SINK,
+    END_NONE,
+    Scratch,
+    SimulationState,
+    SimulationTables,
+)
 from rtsim.simulation_setup import FlightSetup, Parts, Plant, build_parts, start_state
 from rtsim.units import to_deg, to_kt
 from scenarios import script_kernels
@@ -191,10 +198,10 @@ class Bench:
         metrics = np.zeros(kernels.METRIC_COUNT)
         rows = flying.rows[:flown]
         kernels.measure_trial(rows, flying.tables.programme, self._limits, self.dt, metrics)
-        ended = int(flying.state.clock[simulation.CLOCK_END])
-        metrics[kernels.M_COMPLETED] = float(ended == simulation.END_NONE)
+        ended = int(flying.state.clock[CLOCK_END])
+        metrics[kernels.M_COMPLETED] = float(ended == END_NONE)
         metrics[kernels.M_YIELDED] = flying.script_state[script_kernels.S_YIELDED]
-        reason = END_REASONS[ended].format(sink=float(flying.state.clock[simulation.CLOCK_SINK]))
+        reason = END_REASONS[ended].format(sink=float(flying.state.clock[CLOCK_SINK]))
         return TrialFlight(TrialMetrics(metrics), reason, rows.copy() if keep else rows, problems)
 
     def _fly_compiled(self, flying: Flying) -> int:
@@ -279,11 +286,11 @@ class Bench:
 class Flying:
     """Everything of one flight that is about to be flown."""
 
-    tables: simulation.SimulationTables
+    tables: SimulationTables
     """The simulation."""
-    state: simulation.SimulationState
+    state: SimulationState
     """Its state at the start."""
-    scratch: simulation.Scratch
+    scratch: Scratch
     """Its work space."""
     pulses: FloatArray
     """The script."""

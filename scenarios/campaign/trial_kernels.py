@@ -11,9 +11,10 @@ from typing import NamedTuple
 from rtsim.aircraft.signals import INPUT
 from rtsim.compiled import inner_kernel
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.observation_kernels import observe
 from rtsim.protection import law_data as law
 from rtsim.protection.limiter_kernels import torque_limit
-from rtsim.simulation_kernels import (
+from rtsim.simulation_data import (
     CLOCK_END,
     CLOCK_FRAME,
     CLOCK_MODE,
@@ -22,10 +23,8 @@ from rtsim.simulation_kernels import (
     Scratch,
     SimulationState,
     SimulationTables,
-    advance,
-    observe,
-    pilot_command,
 )
+from rtsim.simulation_kernels import advance, pilot_command
 from rtsim.units import DEGREE, INCH_POUND, KNOT
 from scenarios.script_kernels import script_command, script_notice
 

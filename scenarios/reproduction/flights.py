@@ -19,7 +19,8 @@ from rtsim.pilot.weights import PilotSettings
 from rtsim.programme import Programme
 from rtsim.random_streams import STREAM_TURBULENCE, stream_generator
 from rtsim.simulation import END_REASONS
-from rtsim.simulation_kernels import CLOCK_END, CLOCK_SINK, run_frames
+from rtsim.simulation_data import CLOCK_END, CLOCK_SINK
+from rtsim.simulation_kernels import run_frames
 from rtsim.simulation_setup import FlightSetup, Plant, build_parts, start_state
 
 RATE_HZ = 250

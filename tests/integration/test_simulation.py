@@ -12,7 +12,7 @@ from rtsim.errors import InputError
 from rtsim.frame import COLUMN, history_sha256
 from rtsim.programme import Programme
 from rtsim.simulation import FlightSetup, Simulation
-from rtsim.simulation_kernels import SimulationState
+from rtsim.simulation_data import SimulationState
 from rtsim.units import deg, kt
 
 

@@ -23,6 +23,8 @@ LAYERS = (
     ("rtsim.nacelle",),
     ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),
     ("rtsim.plant_kernels",),
+    ("rtsim.simulation_data",),
+    ("rtsim.observation_kernels",),
     ("rtsim.simulation_kernels",),
     ("rtsim.simulation_setup",),
     ("rtsim.simulation",),
