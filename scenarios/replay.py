@@ -15,7 +15,7 @@ from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256
 from rtsim.simulation import MODES, Simulation
 from scenarios.disturbances import DISTURBANCE_KINDS, disturbance_from_event
-from scenarios.runner import setup_from_json, versions
+from scenarios.flight_setup import setup_from_json, versions
 from telemetry.log_format import LogEvent
 from telemetry.log_reader import FlightLog, read_log
 

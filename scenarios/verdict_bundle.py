@@ -12,7 +12,8 @@ from typing import Any
 
 from rtsim.errors import OutputError
 from rtsim.protection import LAW_NAMES
-from scenarios.runner import FlightOutputs, fly, versions
+from scenarios.flight_setup import versions
+from scenarios.runner import FlightOutputs, fly
 from scenarios.scenario import Scenario
 from scenarios.verdict import Case
 

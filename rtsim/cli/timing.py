@@ -72,9 +72,9 @@ def _measure(duration: float, rate: int) -> tuple[TimingReport, TimingLog]:
     """Fly the hover live, with nothing attached to it."""
     from rtsim.realtime import Executive
     from rtsim.simulation import Simulation
+    from scenarios.flight_setup import flight_frames, flight_setup
     from scenarios.loader import load_scenario
     from scenarios.options import Overrides, with_overrides
-    from scenarios.runner import flight_frames, flight_setup
     from scenarios.session import FlightSession
     from scenarios.sinks import FlightSinks
 

@@ -259,7 +259,7 @@ def identity(task: Task) -> dict[str, Any]:
         task: The campaign.
     """
     from rtsim.lpv.storage import load_database
-    from scenarios.runner import versions
+    from scenarios.flight_setup import versions
 
     return {
         "campaign": hashlib.sha256(task.text.encode()).hexdigest(),

@@ -18,10 +18,11 @@ from rtsim.optimization.paths import table_1
 from rtsim.programme import Programme
 from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt
+from scenarios.flight_setup import flight_setup, setup_from_json, setup_to_json
 from scenarios.loader import load_scenario
 from scenarios.options import Overrides
 from scenarios.replay import fly_recording, replay_log
-from scenarios.runner import FlightOutputs, flight_setup, fly, setup_from_json, setup_to_json
+from scenarios.runner import FlightOutputs, fly
 
 ALTITUDE = 100.0
 

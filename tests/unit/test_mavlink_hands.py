@@ -16,11 +16,11 @@ from rtsim.frame import COLUMN
 from rtsim.realtime import Executive, FlightControl
 from rtsim.simulation import Simulation
 from rtsim.units import to_deg
+from scenarios.flight_setup import flight_setup
 from scenarios.hands import Hands
 from scenarios.loader import load_scenario
 from scenarios.mavlink_options import MavlinkOptions, mavlink_config
 from scenarios.options import Overrides, with_overrides
-from scenarios.runner import flight_setup
 from scenarios.scenario import AidName
 from scenarios.session import FlightSession
 from scenarios.sinks import FlightSinks

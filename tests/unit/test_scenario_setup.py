@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from rtsim.programme import Programme
 from rtsim.simulation import FlightSetup
+from scenarios.flight_setup import corridor_outline, flight_frames, flight_setup, setup_from_json, setup_to_json
 from scenarios.loader import library_names, load_scenario
 from scenarios.options import Overrides, with_overrides
-from scenarios.runner import corridor_outline, flight_frames, flight_setup, setup_from_json, setup_to_json
 
 
 def through_json(setup: FlightSetup) -> FlightSetup:
