@@ -6,6 +6,7 @@ import os
 import pty
 import socket
 import time
+from typing import get_args
 
 import pytest
 from hypothesis import given
@@ -19,6 +20,7 @@ from telemetry.joystick.screen import bar, picture
 from telemetry.joystick.sender import Sender, VehicleView
 from telemetry.joystick.stick_map import (
     DeviceAxis,
+    DeviceFunction,
     GamepadMap,
     VehicleMap,
     gamepad_map_for,
@@ -163,6 +165,8 @@ def test_axis_shape_is_odd_and_reaches_its_ends(value, dead_band, expo, reverse)
 
 
 def test_every_function_is_described():
+    functions = {name for part in get_args(DeviceFunction) for name in (get_args(part) or (part,))}
+    assert set(function_words()) == functions
     assert all(function_words().values())
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtsim.errors import InputError, OutputError
+from rtsim.optimization.figures import OBJECTIVES
 from rtsim.optimization.methods import (
     Penalty,
     feasibility_order,
@@ -20,7 +22,7 @@ from rtsim.optimization.methods import (
 from rtsim.optimization.paths import PATH_NAMES
 from rtsim.optimization.problem import CONSTRAINTS, Evaluation
 from rtsim.optimization.search import Archive, Record, fingerprint, nondominated
-from rtsim.optimization.spec import SearchSpec, checked_spec, load_spec, spec_like
+from rtsim.optimization.spec import Objective, SearchSpec, checked_spec, load_spec, spec_like
 
 STARTS = np.array([[0.7, 0.7], [0.9, 0.4]])
 
@@ -237,3 +239,8 @@ def test_a_missing_package_is_named_with_its_extra(monkeypatch):
     monkeypatch.setattr(importlib, "import_module", without_cma)
     with pytest.raises(InputError, match=r"rtsim\[optimize\]"):
         make_method("cma-es", STARTS, population=8, seed=0, penalty=False, objectives=1, constraints=len(CONSTRAINTS))
+
+
+def test_files_may_name_every_objective():
+    """The schema spells the objectives out for the type checker; the table flies them."""
+    assert set(get_args(Objective)) == set(OBJECTIVES)
