@@ -152,6 +152,20 @@ def test_true_delay_is_met_by_the_filters() -> None:
         assert np.max(np.abs(error)) < degrees
 
 
+def test_second_order_filters_are_the_published_ones() -> None:
+    """(s^2 - a s + b)/(s^2 + a s + b), a = k/(2 tau), b = k/tau^2: k = 12 Pade, k = 8 the series of NASA TM-4384."""
+    from rtsim.pilot.delay import delay_filter
+    from rtsim.pilot.response import frequency_response
+
+    tau, frequencies = 0.2, np.array([0.5, 2.5, 10.0, 40.0])
+    s = 1j * frequencies
+    for kind, k in (("pade", 12.0), ("taylor", 8.0)):
+        part = delay_filter(np.array([tau]), order=2, kind=kind)
+        response = frequency_response(part.A, part.B, part.C, part.D, frequencies)[:, 0, 0]
+        a, b = k / (2.0 * tau), k / tau**2
+        assert np.allclose(response, (s**2 - a * s + b) / (s**2 + a * s + b), rtol=1e-12, atol=0.0)
+
+
 def test_a_twenty_state_problem_is_solved_quickly() -> None:
     """Guards the algorithm, not the machine: Newton and mixing need few noise-map evaluations."""
     rng = np.random.default_rng(3)

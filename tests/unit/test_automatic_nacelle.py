@@ -76,6 +76,16 @@ def test_rate_and_acceleration_stay_within_their_limits_without_overshoot(rate):
     assert angles[-1] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_braking_leaves_half_of_the_acceleration_spare():
+    """A schedule that moves on while the nacelles slow down can then still be followed."""
+    law = AutomaticNacelle(LINE, rate=deg(12.0), acceleration=deg(5.0))
+    angles, rates = drive(law, np.full(round(40.0 / DT), kt(140.0)), 90.0)
+    slowing = np.diff(rates)[int(np.argmin(rates)) :] / DT
+    far = rates[int(np.argmin(rates)) : -1] < -deg(4.0)  # nearer than 2.2 deg the gain takes over
+    assert slowing[far].max() == pytest.approx(deg(2.5), rel=0.02)  # 2 %: the rate is held over each frame
+    assert angles[-1] == pytest.approx(0.0, abs=1e-6)
+
+
 def test_it_pauses_at_the_detents_only_where_they_are_wanted():
     airspeeds = ramp(40, 140, 2.0, hold_s=10.0)
     free, _ = drive(AutomaticNacelle(LINE), airspeeds, 90.0)

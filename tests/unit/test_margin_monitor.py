@@ -66,6 +66,7 @@ def test_margins_are_signed_distances(monitor):
         ("pitch_attitude", {"pitch": -deg(25.1)}),
         ("sink", {"climb_rate": -6.1}),
         ("consistency", {"airspeed": kt(70.0)}),
+        ("consistency", {"airspeed": kt(270.0)}),
     ],
 )
 def test_a_margin_is_negative_exactly_where_its_limit_is_passed(monitor, limit, changes):
