@@ -192,9 +192,7 @@ class LimitWatch:
                 self._reasons[place].add(reasons[place])
                 name = _CHANNELS[place][0]
                 data = {"channel": name, "limit": reasons[place]}
-                self._say(
-                    row, "protection", f"{name} protected: {_limit(reasons[place])}", "caution", data
-                )
+                self._say(row, "protection", f"{name} protected: {_limit(reasons[place])}", "caution", data)
 
     def _let_go(self, began: int) -> None:
         """End an episode, with the frame in which it was over, whenever that is noticed."""
