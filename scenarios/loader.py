@@ -10,12 +10,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from rtsim.errors import InputError
+from rtsim.plugins import closest, suggestion
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
 from rtsim.units import deg, kt
 from scenarios.disturbances import air_of, disturbance_problems, faults_of
 from scenarios.metrics import METRIC_NAMES
 from scenarios.nacelle_laws import automatic_problems, automatic_settings
-from scenarios.problems import closest, explain, suggestion
+from scenarios.problems import explain
 from scenarios.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
 from scenarios.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
 from scenarios.verdict_trial import pulses_of, trial_of, trial_problems

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from rtsim.command import Command, NacelleLaw, Sensors
 from rtsim.errors import InputError
+from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.programme import Programme
 from rtsim.units import deg, kt
 
 if TYPE_CHECKING:
     from rtsim.nacelle.automatic import AutomaticNacelle
 
-NacelleName = Annotated[
-    str, Field(pattern=r"^(programme|automatic|[A-Za-z_][\w.]*:[A-Za-z_]\w*)$", min_length=1, max_length=200)
-]
-"""``programme``, ``automatic`` or ``MODULE:CLASS``."""
+NACELLE_PLUGIN = PluginKind(
+    noun="a nacelle law",
+    option="--nacelle",
+    entry_point_group="rtsim.nacelle_laws",
+    built_in=("programme", "automatic"),
+    method="step(sensors, command, dt)",
+    page="rtsim.command.NacelleLaw",
+)
+"""A nacelle law as plug-in."""
+NacelleName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$", min_length=1, max_length=200)]
+"""``programme``, ``automatic``, the name of an entry point, or ``MODULE:CLASS``."""
 Schedule = Literal["centre-line", "programme", "points"]
 NacelleLawFactory = Callable[[], NacelleLaw]
 
@@ -139,10 +144,11 @@ def automatic_nacelle(nacelle: str, settings: AutomaticSettings, programme: Prog
 
 
 def load_nacelle_law(name: str) -> NacelleLawFactory | None:
-    """The plug-in behind ``MODULE:CLASS``; modules are also looked for in the current directory.
+    """The plug-in behind a nacelle law's name.
 
     Args:
-        name: ``programme``, ``automatic`` or ``MODULE:CLASS``.
+        name: ``programme``, ``automatic``, an entry point's name, or ``MODULE:CLASS``; modules are also looked for in
+            the current directory.
 
     Returns:
         Something that makes a fresh law, or None for the two built-in names.
@@ -150,40 +156,12 @@ def load_nacelle_law(name: str) -> NacelleLawFactory | None:
     Raises:
         InputError: There is no such law, it has no ``step`` method, or its module cannot be imported.
     """
-    if name in {"programme", "automatic"}:
+    if name in NACELLE_PLUGIN.built_in:
         return None
-    module_name, colon, class_name = name.partition(":")
-    if not (module_name and colon and class_name):
-        allowed = "programme, automatic, MODULE:CLASS"
-        raise InputError("is not a nacelle law", key="--nacelle", value=name, allowed=allowed)
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        target = getattr(importlib.import_module(module_name), class_name, None)
-    except Exception as error:
-        raise InputError(
-            f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
-            key="--nacelle",
-            value=name,
-            mend="name a module of the current directory or an installed one",
-        ) from error
-    if not callable(target) or not callable(getattr(target, "step", None)):
-        raise InputError(
-            "is not a nacelle law: it is no class with a method step(sensors, command, dt)",
-            key="--nacelle",
-            value=name,
-            mend="see rtsim.command.NacelleLaw",
-        )
+    target = find_plugin(name, NACELLE_PLUGIN)
 
     def make() -> NacelleLaw:
-        try:
-            law: NacelleLaw = target()
-        except Exception as error:
-            problem = f"the law cannot be made: {type(error).__name__}: {error}"
-            mend = "its class must take no arguments"
-            raise InputError(problem, key="--nacelle", value=name, mend=mend) from error
-        return law
+        return cast("NacelleLaw", make_plugin(target, name, NACELLE_PLUGIN))
 
     return make
 
@@ -216,7 +194,7 @@ class NacelleLawGuard:
             return command, ""
         try:
             rate = float(self._law.step(sensors, command, dt))
-        except Exception as error:  # noqa: BLE001 - a user's own code may raise anything; the flight must go on
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything; the flight must go on
             failure = f"the nacelle law raised {type(error).__name__}: {error}"
         else:
             if math.isfinite(rate):

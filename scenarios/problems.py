@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import types
 from collections.abc import Iterable
 from typing import Any, Literal, Union, get_args, get_origin
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from rtsim.errors import InputError
+from rtsim.plugins import closest, suggestion
 
 _KINDS = {float: "a number", int: "a whole number", str: "a text in quotes", bool: "true or false"}
 
@@ -44,32 +44,6 @@ def dotted(location: Iterable[str | int]) -> str:
     for part in location:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
     return text
-
-
-def closest(word: str, choices: Iterable[str]) -> list[str]:
-    """Choices ordered by likeness to a word, the likeliest first.
-
-    Args:
-        word: What the user wrote.
-        choices: What could have been meant.
-    """
-
-    def likeness(choice: str) -> float:
-        return difflib.SequenceMatcher(None, word.lower(), choice.lower()).ratio()
-
-    return sorted(choices, key=lambda choice: (-likeness(choice), choice))
-
-
-def suggestion(word: str, choices: Iterable[str], *, otherwise: str) -> str:
-    """An imperative that names the choice a user probably meant.
-
-    Args:
-        word: What the user wrote.
-        choices: What could have been meant.
-        otherwise: The imperative where nothing is similar.
-    """
-    similar = difflib.get_close_matches(word.lower(), list(choices), n=1, cutoff=0.5)
-    return f"perhaps '{similar[0]}' is meant" if similar else otherwise
 
 
 def _is_union_tag(part: str | int) -> bool:

@@ -8,9 +8,9 @@ from typing import Any
 
 from rtsim.errors import OutputError
 from rtsim.frame import SIGNAL_NAMES, SIGNALS, FloatArray
+from rtsim.plugins import closest
 from rtsim.realtime.report import Spread, TimingReport
 from scenarios.metrics import FlightMetrics
-from scenarios.problems import closest
 from scenarios.scenario import Scenario
 from telemetry.log_format import LogEvent
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rtsim.errors import InputError
+from rtsim.plugins import suggestion
 from rtsim.units import deg
-from scenarios.problems import suggestion
 from scenarios.script import Pulse
 from scenarios.verdict_schema import PulseTable, TrialTable
 

@@ -68,8 +68,8 @@ def file_problems(name: str) -> list[str]:
     """
     if Path(name).suffix in DATABASE_SUFFIXES:
         return _database_problems(Path(name))
+    from rtsim.plugins import suggestion
     from scenarios.loader import scenario_problems
-    from scenarios.problems import suggestion
 
     suffix = Path(name).suffix
     if suffix and suffix != ".toml" and "/" not in suffix:

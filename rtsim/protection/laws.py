@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import copy
-import difflib
-import importlib
 import math
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
-from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.lpv.storage import load_database
+from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels, limiter_kernels
 from rtsim.protection.boundary import BoundaryName
@@ -27,8 +22,15 @@ from rtsim.protection.limits import LIMIT_KINDS, load_limits
 from rtsim.protection.monitor import sensor_array
 from rtsim.protection.tables import LAW_NAMES, law_tables
 
-ENTRY_POINT_GROUP = "rtsim.protection_laws"
-"""Group under which an installed package offers protection laws by name."""
+LAW_PLUGIN = PluginKind(
+    noun="a protection law",
+    option="--protection",
+    entry_point_group="rtsim.protection_laws",
+    built_in=tuple(LAW_NAMES),
+    method="step(sensors, command, margins, dt)",
+    page="docs/protection.md",
+)
+"""A protection law as plug-in."""
 CHANNELS: tuple[Literal["stick", "lever", "nacelle_rate"], ...] = ("stick", "lever", "nacelle_rate")
 """What a law may change, in the order of a command."""
 _CLIPS = (data.REASON_FLAP, data.REASON_PITCH, data.REASON_TORQUE)
@@ -191,17 +193,8 @@ class LawSpec:
         """
         if self.built_in:
             return BuiltInLaw(self.name, boundary=self.boundary, database=load_database(self.database or None))
-        factory = _find(self.name)
-        try:
-            made: ProtectionLaw = factory()
-        except Exception as error:
-            raise InputError(
-                f"the law cannot be made: {type(error).__name__}: {error}",
-                key="--protection",
-                value=self.name,
-                mend="its class must take no arguments",
-            ) from error
-        return made
+        target = find_plugin(self.name, LAW_PLUGIN)
+        return cast("ProtectionLaw", make_plugin(target, self.name, LAW_PLUGIN))
 
 
 def load_law(name: str, *, boundary: BoundaryName = "flight", database: str = "") -> LawSpec:
@@ -221,7 +214,7 @@ def load_law(name: str, *, boundary: BoundaryName = "flight", database: str = ""
     """
     spec = LawSpec(name, boundary, database)
     if not spec.built_in:
-        _find(name)
+        find_plugin(name, LAW_PLUGIN)
     return spec
 
 
@@ -246,80 +239,3 @@ def load_laws(
     if len(laws) == 1:
         return laws
     return tuple(law for law in laws if law.name != "off")
-
-
-def _find(name: str) -> Callable[[], ProtectionLaw]:
-    target = _from_module(name) if ":" in name else _from_entry_point(name)
-    if not callable(target) or not callable(getattr(target, "step", None)):
-        raise InputError(
-            "is not a protection law: it is no class with a method step(sensors, command, margins, dt)",
-            key="--protection",
-            value=name,
-            mend="see docs/protection.md",
-        )
-    return target  # type: ignore[no-any-return]
-
-
-def _from_module(name: str) -> Any:
-    module_name, _, class_name = name.partition(":")
-    if not (module_name and class_name):
-        raise InputError("is half a name", key="--protection", value=name, mend="write MODULE:CLASS")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        missing = error.name or module_name
-        own = module_name == missing or module_name.startswith(f"{missing}.")
-        raise InputError(
-            f"there is no module {missing}" if own else f"its module needs {missing}, which is not installed",
-            key="--protection",
-            value=name,
-            mend="name a module of the current directory or an installed one" if own else f"install {missing}",
-        ) from error
-    except (Exception, SystemExit) as error:
-        raise InputError(
-            f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
-            key="--protection",
-            value=name,
-            mend="correct the module",
-        ) from error
-    target = getattr(module, class_name, None)
-    if target is None:
-        classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "step")]
-        raise InputError(
-            f"the module {module_name} has no class {class_name}",
-            key="--protection",
-            value=name,
-            allowed=", ".join(classes) or None,
-            mend=_suggestion(class_name, classes, otherwise="name a class with a method step"),
-        )
-    return target
-
-
-def _from_entry_point(name: str) -> Any:
-    offered = {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)}
-    if name not in offered:
-        choices = [*LAW_NAMES, *offered]
-        raise InputError(
-            "is not a protection law",
-            key="--protection",
-            value=name,
-            allowed=", ".join([*choices, "MODULE:CLASS"]),
-            mend=_suggestion(name, choices, otherwise="choose one"),
-        )
-    try:
-        return offered[name].load()
-    except Exception as error:
-        raise InputError(
-            f"the entry point cannot be loaded: {type(error).__name__}: {error}",
-            key="--protection",
-            value=name,
-            mend="reinstall the package that offers it",
-        ) from error
-
-
-def _suggestion(given: str, choices: Sequence[str], *, otherwise: str) -> str:
-    near = difflib.get_close_matches(given, choices, n=1)
-    return f"did you mean {near[0]}?" if near else otherwise

@@ -14,7 +14,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtsim.errors import InputError
-from scenarios.problems import closest, explain, suggestion
+from rtsim.plugins import closest, suggestion
+from scenarios.problems import explain
 from scenarios.scenario import CorridorName
 from scenarios.verdict_events import EVENTS
 from scenarios.verdict_trial import LARGEST_LEVER, LARGEST_STICK

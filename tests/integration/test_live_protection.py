@@ -165,7 +165,7 @@ def test_a_law_that_does_not_exist_is_a_mistake_of_the_user(capsys: pytest.Captu
     assert run(["fly", "hover", "--headless", "--speed", "max", "--protection", "govenor"]) == 2
     message = " ".join(capsys.readouterr().err.split())
     assert "govenor" in message
-    assert "did you mean governor?" in message
+    assert "perhaps 'governor' is meant" in message
 
 
 def test_the_law_of_the_documentation_flies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
 
+from rtsim import plugins
 from rtsim.command import Command, NacelleLaw, Sensors
 from rtsim.errors import InputError
 from rtsim.nacelle.automatic import (
@@ -23,7 +25,7 @@ from rtsim.optimization.paths import table_1
 from rtsim.programme import Programme
 from rtsim.units import deg, kt, to_deg, to_kt
 from scenarios.loader import parse_scenario
-from scenarios.nacelle_laws import NacelleLawGuard, automatic_nacelle, load_nacelle_law
+from scenarios.nacelle_laws import NACELLE_PLUGIN, NacelleLawGuard, automatic_nacelle, load_nacelle_law
 
 DT = 0.004
 LINE = NacelleSchedule((kt(40.0), kt(140.0)), (deg(90.0), 0.0))
@@ -196,7 +198,7 @@ def test_scenarios_choose_the_law():
 @pytest.mark.parametrize(
     ("nacelle", "table", "key"),
     [
-        ('"manual"', "", "flight.nacelle"),
+        ('"two words"', "", "flight.nacelle"),
         ('"programme"', "[automatic]", "automatic"),
         ('"automatic"', "[automatic]\nrate_deg_s = 20", "automatic.rate_deg_s"),
         ('"automatic"', '[automatic]\nschedule = "points"', "automatic.points"),
@@ -230,6 +232,14 @@ class Raises:
         raise ZeroDivisionError("no airspeed")
 
 
+class Exits:
+    """A law that wants to end the program."""
+
+    def step(self, sensors, command, dt):  # noqa: ARG002 - the interface's
+        """Leave."""
+        raise SystemExit("enough")
+
+
 class NotFinite:
     """A law without an answer."""
 
@@ -251,7 +261,8 @@ class NeedsMore:
 def test_a_law_that_fails_is_named_and_left_out():
     command = Command(0.1, 0.5, 0.2)
     assert NacelleLawGuard(Steady).step(SENSORS, command, DT) == (Command(0.1, 0.5, -deg(1.0)), "")
-    for kind, words in ((Raises, "ZeroDivisionError: no airspeed"), (NotFinite, "not finite")):
+    failing = ((Raises, "ZeroDivisionError: no airspeed"), (Exits, "SystemExit: enough"), (NotFinite, "not finite"))
+    for kind, words in failing:
         guard = NacelleLawGuard(kind)
         changed, failure = guard.step(SENSORS, command, DT)
         assert changed == command
@@ -269,9 +280,11 @@ def test_laws_are_found_by_module_and_class():
     assert isinstance(factory(), Table1Nacelle)
     for name, words in (
         ("manual", "is not a nacelle law"),
-        ("no_such_module_here:Law", "cannot be imported"),
+        ("no_such_module_here:Law", "there is no module no_such_module_here"),
         ("math:pi", "no class with a method step"),
-        (f"{__name__}:Missing", "no class with a method step"),
+        ("rtsim.nacelle.automatic:Table1Nacele", "'Table1Nacelle' is meant"),
+        (":Law", "is half a name"),
+        (f"{__name__}:Missing", "has no class Missing"),
     ):
         with pytest.raises(InputError, match=words):
             load_nacelle_law(name)
@@ -279,3 +292,12 @@ def test_laws_are_found_by_module_and_class():
     assert made is not None
     with pytest.raises(InputError, match="cannot be made"):
         made()
+
+
+def test_laws_of_installed_packages_are_found_by_name(monkeypatch):
+    point = EntryPoint("table", "rtsim.nacelle.automatic:Table1Nacelle", NACELLE_PLUGIN.entry_point_group)
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [point] if group == point.group else [])
+    factory = load_nacelle_law("table")
+    assert factory is not None
+    assert isinstance(factory(), Table1Nacelle)
+    assert parsed('"table"').nacelle == "table"

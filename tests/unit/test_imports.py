@@ -15,7 +15,7 @@ LAYERS = (
     ("rtsim.errors",),
     ("rtsim.frame",),
     ("rtsim.command",),
-    ("rtsim.kernel_cache", "rtsim.random_streams"),
+    ("rtsim.kernel_cache", "rtsim.random_streams", "rtsim.plugins"),
     ("rtsim.compiled",),
     ("rtsim.ramp_filter_kernels",),
     ("rtsim.aircraft", "rtsim.corridor", "rtsim.programme", "rtsim.atmosphere", "telemetry"),

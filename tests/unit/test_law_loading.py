@@ -10,10 +10,11 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
+from rtsim import plugins
 from rtsim.command import Command, Margins, ProtectionLaw, Sensors
 from rtsim.errors import InputError
 from rtsim.protection import BuiltInLaw, compiled_law, load_law, load_laws
-from rtsim.protection import laws as module
+from rtsim.protection.laws import LAW_PLUGIN
 from rtsim.units import INCH_POUND, deg, kt
 
 GOOD = """
@@ -77,8 +78,8 @@ def test_a_spec_travels_to_a_worker():
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("governer", "did you mean governor"),
-        ("own_laws:Kept", "did you mean Keep"),
+        ("governer", "'governor' is meant"),
+        ("own_laws:Kept", "'Keep' is meant"),
         ("own_laws:NoStep", "no class with a method step"),
         ("no_module_here:Law", "there is no module no_module_here"),
         ("broken_law:Law", "needs no_such_package_anywhere"),
@@ -96,9 +97,9 @@ def test_a_class_that_wants_arguments_is_refused_when_made():
 
 
 def test_entry_points_are_found_by_name(monkeypatch):
-    point = EntryPoint("soft", "own_laws:Keep", module.ENTRY_POINT_GROUP)
-    wrong = EntryPoint("gone", "own_laws_gone:Keep", module.ENTRY_POINT_GROUP)
-    monkeypatch.setattr(module, "entry_points", lambda group: [point, wrong] if group == point.group else [])
+    point = EntryPoint("soft", "own_laws:Keep", LAW_PLUGIN.entry_point_group)
+    wrong = EntryPoint("gone", "own_laws_gone:Keep", LAW_PLUGIN.entry_point_group)
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [point, wrong] if group == point.group else [])
     assert load_law("soft").make().step(sensors(), Command(0.0, 0.5, 0.0), MARGINS, 0.02)[1] == []
     with pytest.raises(InputError, match="reinstall"):
         load_law("gone")

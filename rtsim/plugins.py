@@ -1,0 +1,165 @@
+"""A pilot or law of the user's own: found by ``MODULE:CLASS`` or by an entry point's name, one way for all."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any
+
+from rtsim.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class PluginKind:
+    """What can be plugged in at one place."""
+
+    noun: str
+    """What it is called, with its article."""
+    option: str
+    """The option of ``rtsim fly`` that names it."""
+    entry_point_group: str
+    """Group under which an installed package offers some by name."""
+    built_in: tuple[str, ...]
+    """Names that need no plug-in."""
+    method: str
+    """The method its class must have, as people write it."""
+    page: str
+    """Where that method is described."""
+
+
+def find_plugin(name: str, kind: PluginKind) -> Callable[[], Any]:
+    """The class behind a name.
+
+    Args:
+        name: ``MODULE:CLASS``, the module also looked for in the current directory, or an entry point's name.
+        kind: What it is to be.
+
+    Returns:
+        The class, which has the method but has not been called.
+
+    Raises:
+        InputError: There is none of that name, it cannot be imported, or it lacks the method.
+    """
+    target = _from_module(name, kind) if ":" in name else _from_entry_point(name, kind)
+    if not callable(target) or not callable(getattr(target, "step", None)):
+        raise InputError(
+            f"is not {kind.noun}: it is no class with a method {kind.method}",
+            key=kind.option,
+            value=name,
+            mend=f"see {kind.page}",
+        )
+    found: Callable[[], Any] = target
+    return found
+
+
+def make_plugin(target: Callable[[], Any], name: str, kind: PluginKind) -> Any:
+    """Make a fresh one.
+
+    Args:
+        target: The class, from :func:`find_plugin`.
+        name: The name it was found by.
+        kind: What it is.
+
+    Raises:
+        InputError: Its class wants arguments or failed.
+    """
+    try:
+        return target()
+    except (Exception, SystemExit) as error:
+        raise InputError(
+            f"the {kind.noun.partition(' ')[2]} cannot be made: {type(error).__name__}: {error}",
+            key=kind.option,
+            value=name,
+            mend="its class must take no arguments",
+        ) from error
+
+
+def closest(word: str, choices: Iterable[str]) -> list[str]:
+    """Choices ordered by likeness to a word, the likeliest first.
+
+    Args:
+        word: What the user wrote.
+        choices: What could have been meant.
+    """
+
+    def likeness(choice: str) -> float:
+        return difflib.SequenceMatcher(None, word.lower(), choice.lower()).ratio()
+
+    return sorted(choices, key=lambda choice: (-likeness(choice), choice))
+
+
+def suggestion(word: str, choices: Iterable[str], *, otherwise: str) -> str:
+    """An imperative that names the choice a user probably meant.
+
+    Args:
+        word: What the user wrote.
+        choices: What could have been meant.
+        otherwise: The imperative where nothing is similar.
+    """
+    similar = difflib.get_close_matches(word.lower(), list(choices), n=1, cutoff=0.5)
+    return f"perhaps '{similar[0]}' is meant" if similar else otherwise
+
+
+def _from_module(name: str, kind: PluginKind) -> Any:
+    module_name, _, class_name = name.partition(":")
+    if not (module_name and class_name):
+        raise InputError("is half a name", key=kind.option, value=name, mend="write MODULE:CLASS")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        missing = error.name or module_name
+        own = module_name == missing or module_name.startswith(f"{missing}.")
+        raise InputError(
+            f"there is no module {missing}" if own else f"its module needs {missing}, which is not installed",
+            key=kind.option,
+            value=name,
+            mend="name a module of the current directory or an installed one" if own else f"install {missing}",
+        ) from error
+    except (Exception, SystemExit) as error:
+        raise InputError(
+            f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
+            key=kind.option,
+            value=name,
+            mend="correct the module",
+        ) from error
+    target = getattr(module, class_name, None)
+    if target is None:
+        classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "step")]
+        raise InputError(
+            f"the module {module_name} has no class {class_name}",
+            key=kind.option,
+            value=name,
+            allowed=", ".join(closest(class_name, classes)) or None,
+            mend=suggestion(class_name, classes, otherwise="name a class with a method step"),
+        )
+    return target
+
+
+def _from_entry_point(name: str, kind: PluginKind) -> Any:
+    offered = {point.name: point for point in entry_points(group=kind.entry_point_group)}
+    if name not in offered:
+        choices = [*kind.built_in, *offered]
+        raise InputError(
+            f"is not {kind.noun}",
+            key=kind.option,
+            value=name,
+            allowed=", ".join([*choices, "MODULE:CLASS"]),
+            mend=suggestion(name, choices, otherwise="choose one"),
+        )
+    try:
+        return offered[name].load()
+    except (Exception, SystemExit) as error:
+        raise InputError(
+            f"the entry point cannot be loaded: {type(error).__name__}: {error}",
+            key=kind.option,
+            value=name,
+            mend="reinstall the package that offers it",
+        ) from error
