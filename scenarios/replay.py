@@ -19,9 +19,6 @@ from scenarios.flight_setup import setup_from_json, versions
 from telemetry.log_format import LogEvent
 from telemetry.log_reader import FlightLog, read_log
 
-ACTING_KINDS = frozenset({"reset", "pilot", "aid", "law", "override", *DISTURBANCE_KINDS})
-"""Kinds of the events that change a flight; a replay does them again."""
-
 
 @dataclass(frozen=True, slots=True)
 class Difference:

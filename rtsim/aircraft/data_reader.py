@@ -43,17 +43,6 @@ def read_data() -> tuple[Data, Data]:
     )
 
 
-def data_sha256() -> str:
-    """Hash of the data files, recorded in every database made from them."""
-    import hashlib
-
-    folder = files("rtsim.aircraft") / "data"
-    digest = hashlib.sha256()
-    for name in ("xv15_inputs.toml", "model_choices.toml"):
-        digest.update((folder / name).read_bytes())
-    return digest.hexdigest()
-
-
 def _against_nacelle(mast_deg: Sequence[float], rows: Sequence[Sequence[float]]) -> Curves:
     """Curves printed against mast angle, turned round to run against nacelle angle [rad]."""
     nacelle = [deg(90.0 - b) for b in reversed(mast_deg)]

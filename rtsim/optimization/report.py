@@ -11,16 +11,6 @@ from rtsim.optimization.path import ConversionPath
 from rtsim.optimization.problem import ConversionProblem
 from rtsim.optimization.search import SearchResult
 
-METRIC_OF: dict[str, str] = {
-    "flapping_integral": "flapping_deg.integral_deg_s",
-    "flapping_peak": "flapping_deg.peak",
-    "flapping_rms": "flapping_deg.rms",
-    "stick_effort": "stick.rms_rate_in_s",
-    "lever_effort": "lever.rms_rate_per_s",
-    "altitude_excursion": "altitude_m.max_deviation",
-}
-"""The key of ``rtsim fly --json`` that holds an objective, where one does."""
-
 
 def best_path(problem: ConversionProblem, result: SearchResult) -> ConversionPath:
     """The best path with a description of what it is.

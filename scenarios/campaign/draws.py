@@ -13,7 +13,7 @@ from rtsim.faults import Fault
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
-from rtsim.units import deg, kt, to_deg, to_kt
+from rtsim.units import deg, kt
 from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
 from scenarios.campaign.trial import FlightPlan, has_trim
 from scenarios.loader import load_scenario
@@ -180,20 +180,3 @@ def _gusts(item: ClassTable, generator: Generator) -> list[Gust]:
         ahead, below = sign * kt(draw(table.ahead_kt, generator)), sign * kt(draw(table.below_kt, generator))
         found.append(Gust(start=start, duration=duration, ahead=ahead, below=below))
     return found
-
-
-def describe_plan(plan: FlightPlan) -> dict[str, float | str]:
-    """The flight in a few numbers, for tables of runs.
-
-    Args:
-        plan: The flight.
-    """
-    return {
-        "start_airspeed_kt": to_kt(plan.start.airspeed),
-        "start_nacelle_deg": to_deg(plan.start.nacelle_angle),
-        "start_altitude_m": plan.start.altitude,
-        "target_airspeed_kt": to_kt(float(plan.programme.airspeed[-1])),
-        "target_nacelle_deg": to_deg(float(plan.programme.nacelle_angle[-1])),
-        "pulses": float(len(plan.pulses)),
-        "reaction_s": -1.0 if plan.reaction is None else plan.reaction,
-    }

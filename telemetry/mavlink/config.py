@@ -115,13 +115,6 @@ class MavlinkConfig:
     version: str = "0.0.0"
     """Version of rtsim."""
 
-    @property
-    def networked(self) -> bool:
-        """Whether anything of it leaves this machine."""
-        return not (
-            ipaddress.ip_address(self.bind_host).is_loopback and all(target.loopback for target in self.targets)
-        )
-
     def to_json(self) -> str:
         """The settings as one line of JSON."""
         return json.dumps(asdict(self))
