@@ -101,9 +101,7 @@ def optimize_command(
     from rtsim.optimization.problem import ConversionProblem
 
     problem = ConversionProblem(chosen, workers=jobs)
-    if not resume:
-        record_file.unlink(missing_ok=True)
-    result = _search(problem, dask, record_file)
+    result = _search(problem, dask, record_file, resume=resume)
     summary = _save(problem, result, scenario_file, record_file, check=not no_check and not result.interrupted)
     if json:
         emit_json(summary)
@@ -121,26 +119,18 @@ def _specification(file: Path | None, like: str | None, changes: dict[str, Any])
     if file is not None and like is not None:
         raise InputError("cannot be combined with a specification file", key="--like", mend="give one of them")
     if file is not None:
-        base = load_spec(file)
-    elif like is not None:
-        base = spec_like(like)
-    else:
-        base = SearchSpec()
-    data = base.model_dump()
-    for key, value in changes.items():
-        table, _, name = key.rpartition(".")
-        (data[table] if table else data)[name] = value
-    several = len(data["objectives"]) > 1
-    if several and "search.method" not in changes and file is None:
-        data["search"]["method"] = "nsga2"
-    return checked_spec(data)
+        return load_spec(file, changes)
+    base = spec_like(like) if like is not None else SearchSpec()
+    if len(changes.get("objectives", ())) > 1:
+        changes = {"search.method": "nsga2"} | changes
+    return checked_spec(base.model_dump(), changes)
 
 
-def _search(problem: ConversionProblem, address: str | None, record_file: Path) -> SearchResult:
+def _search(problem: ConversionProblem, address: str | None, record_file: Path, *, resume: bool) -> SearchResult:
     from rtsim.optimization.search import run_search
 
     with _evaluator(problem, address) as evaluator, _progress_bar(problem.spec.search.generations) as told:
-        return run_search(problem, evaluator=evaluator, record_path=record_file, on_progress=told)
+        return run_search(problem, evaluator=evaluator, record_path=record_file, resume=resume, on_progress=told)
 
 
 def _evaluator(problem: ConversionProblem, address: str | None) -> Any:

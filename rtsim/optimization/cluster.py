@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import lru_cache
 from types import TracebackType
 from typing import Any, Self
@@ -14,6 +15,8 @@ from rtsim.optimization.problem import ConversionProblem, Evaluation
 from rtsim.optimization.spec import SearchSpec
 
 CONNECT_TIMEOUT_S = 10
+ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx)://)?(\[[0-9a-fA-F:]+\]|[\w.-]+):\d{1,5}")
+"""Addresses of schedulers: ``tcp://HOST:PORT``."""
 RETRIES = 3
 """How often a piece of a generation is tried anew when its worker dies."""
 
@@ -60,6 +63,9 @@ class ClusterEvaluator:
                 key="--dask",
                 mend="install it with: pip install 'rtsim[cluster]'",
             ) from None
+        if not ADDRESS.fullmatch(address):
+            # distributed would refuse it too, then hang for 20 s and print a traceback while it is cleaned up.
+            raise InputError("is not the address of a Dask scheduler", key="--dask", value=address, allowed="HOST:PORT")
         self._spec_json = problem.spec.model_dump_json()
         self._hash = problem.database_hash
         try:

@@ -148,14 +148,23 @@ class CmaMethod:
 
 
 class PymooMethod:
-    """pymoo's genetic algorithms: GA for one objective, NSGA-II for several."""
+    """pymoo's genetic algorithms: GA for one objective, NSGA-II for one or several."""
 
     def __init__(
-        self, starts: FloatArray, *, population: int, seed: int, penalty: bool, objectives: int, constraints: int
+        self,
+        name: str,
+        starts: FloatArray,
+        *,
+        population: int,
+        seed: int,
+        penalty: bool,
+        objectives: int,
+        constraints: int,
     ) -> None:
         """Set up.
 
         Args:
+            name: ``ga`` or ``nsga2``.
             starts: Start vectors, the best first, shape (starts, variables).
             population: Candidates per generation.
             seed: Root of its random stream.
@@ -179,7 +188,7 @@ class PymooMethod:
             xu=np.ones(count),
         )
         first = strewn_about(starts, population, random)
-        kind = GA if objectives == 1 else NSGA2
+        kind = NSGA2 if name == "nsga2" else GA
         self._algorithm = kind(pop_size=population, sampling=first, eliminate_duplicates=True)
         own_seed = int(random.integers(2**31 - 1))
         self._algorithm.setup(self._problem, termination=("n_gen", 10**9), seed=own_seed, verbose=False)
@@ -254,7 +263,7 @@ def make_method(
     if name == "cma-es":
         return CmaMethod(starts, population=population, seed=seed, penalty=penalty)
     return PymooMethod(
-        starts, population=population, seed=seed, penalty=penalty, objectives=objectives, constraints=constraints
+        name, starts, population=population, seed=seed, penalty=penalty, objectives=objectives, constraints=constraints
     )
 
 

@@ -19,36 +19,27 @@ def best_path(problem: ConversionProblem, result: SearchResult) -> ConversionPat
         problem: What was searched.
         result: What was found.
     """
-    return described(problem, problem.path(result.best), result.objectives)
-
-
-def described(problem: ConversionProblem, path: ConversionPath, objectives: tuple[float, ...]) -> ConversionPath:
-    """A path of the search with a description of what it is.
-
-    Args:
-        problem: What was searched.
-        path: The path.
-        objectives: Its objectives.
-    """
     spec = problem.spec
-    values = ", ".join(f"{name} {value:.6g}" for name, value in zip(spec.objectives, objectives, strict=True))
+    values = ", ".join(f"{name} {value:.6g}" for name, value in zip(spec.objectives, result.objectives, strict=True))
     search = spec.search
     robust = f", over {spec.robust.flights} flights in turbulence" if spec.robust.flights else ""
     text = (
-        f"Found by {search.method}, seed {search.seed}, {search.generations} x {search.population} candidates{robust}: "
+        f"Found by {search.method}, seed {search.seed}, {result.generations} x {search.population} candidates{robust}: "
         f"{values}. Nacelle rate {spec.nacelle_rate_deg_s:g} deg/s."
     )
-    return dataclasses.replace(path, description=text)
+    return dataclasses.replace(problem.path(result.best), description=text)
 
 
 def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
-    """The scenario file of a path found: it flies exactly as the search flew it.
+    """The scenario file of a path found: it flies exactly as the search flew it, but for turbulence and pilot noise.
 
     Args:
         problem: What was searched.
         path: The path.
     """
-    spec, limits = problem.spec, problem.spec.limits
+    spec = problem.spec
+    # What a robust search asked for in turbulence is all that is known to hold; in calm air it holds all the more.
+    limits = spec.robust if spec.robust.flights else spec.limits
     flight: dict[str, str | int | float | bool] = {
         "plant": spec.flight.plant,
         "outer_loop": spec.flight.outer_loop,

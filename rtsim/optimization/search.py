@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
+import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,12 +95,13 @@ class SearchResult:
 class Record:
     """Everything a search has evaluated, on disk in one file that is replaced as a whole."""
 
-    def __init__(self, path: Path | None, fingerprint: str) -> None:
+    def __init__(self, path: Path | None, fingerprint: str, *, resume: bool = True) -> None:
         """Open or begin a record.
 
         Args:
             path: The file; None keeps the record in memory only.
             fingerprint: What the search is; a record of another search is refused.
+            resume: Go on from the file, if there is one; else it is replaced once a generation is done.
 
         Raises:
             InputError: The file belongs to another search or is no record.
@@ -107,7 +109,7 @@ class Record:
         self.path = path
         self.fingerprint = fingerprint
         self.generations: list[Evaluation] = []
-        if path is not None and path.exists():
+        if resume and path is not None and path.exists():
             self._read(path)
 
     def add(self, evaluation: Evaluation) -> None:
@@ -143,12 +145,19 @@ class Record:
 
     def _read(self, path: Path) -> None:
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+                if int(data["format"]) != RECORD_FORMAT:
+                    raise ValueError
                 fingerprint = str(data["fingerprint"])
                 ends = np.cumsum(data["sizes"])[:-1]
                 parts = [np.split(data[name], ends) for name in ("variables", "objectives", "constraints")]
-        except (OSError, ValueError, KeyError, EOFError) as error:
-            raise InputError(f"is not the record of a search ({error})", file=str(path), mend="name another") from None
+        except (OSError, ValueError, TypeError, LookupError, EOFError, zipfile.BadZipFile):
+            # numpy's own words would advise to unpickle the file: they are left out.
+            raise InputError(
+                "is not the record of a search, or is damaged",
+                file=str(path),
+                mend="delete it and search anew without --resume",
+            ) from None
         if fingerprint != self.fingerprint:
             raise InputError(
                 "is the record of another search (specification or database differ)",
@@ -175,6 +184,7 @@ def run_search(
     *,
     evaluator: Evaluator | None = None,
     record_path: Path | None = None,
+    resume: bool = True,
     on_progress: Callable[[Progress], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> SearchResult:
@@ -184,6 +194,7 @@ def run_search(
         problem: What is searched.
         evaluator: Who flies the candidates; None: the problem itself, on this machine.
         record_path: Record to resume from and to keep; None keeps none.
+        resume: Go on from the record; else it is replaced once the first generation is done.
         on_progress: Told after each generation.
         should_stop: Asked before each generation whether to end now.
 
@@ -197,7 +208,7 @@ def run_search(
     """
     spec = problem.spec
     evaluator = problem if evaluator is None else evaluator
-    record = Record(record_path, fingerprint(spec, problem.database_hash))
+    record = Record(record_path, fingerprint(spec, problem.database_hash), resume=resume)
     starts = start_vectors(problem)
     method = make_method(
         spec.search.method,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -34,9 +35,9 @@ Cap = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 
 
 class _Strict(BaseModel):
-    """A table of the file: no unknown keys, read-only."""
+    """A table of the file: exact types, no unknown keys, read-only."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 class AccelerationTable(_Strict):
@@ -145,11 +146,12 @@ def spec_like(path: str) -> SearchSpec:
     )
 
 
-def load_spec(path: str | Path) -> SearchSpec:
+def load_spec(path: str | Path, changes: Mapping[str, Any] | None = None) -> SearchSpec:
     """Read a specification file.
 
     Args:
         path: The TOML file.
+        changes: Values that override the file's, by key: ``points``, ``search.seed``.
 
     Raises:
         InputError: It does not exist, is no TOML, or has a key or value that is not allowed (the first one found).
@@ -165,32 +167,29 @@ def load_spec(path: str | Path) -> SearchSpec:
         raise InputError(f"is not valid TOML: {error}", file=str(path), mend="correct this line") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", file=str(path)) from None
-    return checked_spec(data, file=str(path))
+    return checked_spec(data, changes, file=str(path))
 
 
-def checked_spec(data: dict[str, Any], *, file: str | None = None) -> SearchSpec:
+def checked_spec(
+    data: Mapping[str, Any], changes: Mapping[str, Any] | None = None, *, file: str | None = None
+) -> SearchSpec:
     """Check the content of a specification.
 
     Args:
         data: The tables.
-        file: Where they came from, for messages.
+        changes: Values that override them, by key: ``points``, ``search.seed``.
+        file: Where the tables came from, for messages.
 
     Raises:
         InputError: A key or value is not allowed; the first one found.
     """
-    try:
-        spec = SearchSpec.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
-        unknown = first["type"] == "extra_forbidden"
-        raise InputError(
-            "is not a key of a search specification" if unknown else str(first["msg"]).lower(),
-            file=file,
-            key=key,
-            value=None if unknown or first["type"] == "missing" else first["input"],
-            mend="see docs/optimization.md",
-        ) from None
+    spec = _validated(data, file)
+    if changes:
+        whole = spec.model_dump()
+        for key, value in changes.items():
+            table, _, name = key.rpartition(".")
+            (whole[table] if table else whole)[name] = value
+        spec = _validated(whole, None)
     if len(set(spec.objectives)) != len(spec.objectives):
         raise InputError("names an objective twice", file=file, key="objectives", value=list(spec.objectives))
     if len(spec.objectives) > 1 and spec.search.method != "nsga2":
@@ -203,3 +202,21 @@ def checked_spec(data: dict[str, Any], *, file: str | None = None) -> SearchSpec
             mend="choose nsga2 or one objective",
         )
     return spec
+
+
+
+def _validated(data: Mapping[str, Any], file: str | None) -> SearchSpec:
+    """Each value on its own; the first one that is not allowed is told."""
+    try:
+        return SearchSpec.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        told = {"extra_forbidden": "is not a key of a search specification", "model_type": "must be a table"}
+        nothing = first["type"] in {"extra_forbidden", "missing"}
+        raise InputError(
+            told.get(first["type"], str(first["msg"]).lower()),
+            file=file,
+            key=".".join(str(part) for part in first["loc"]),
+            value=None if nothing else first["input"],
+            mend="see docs/optimization.md",
+        ) from None

@@ -77,6 +77,15 @@ def test_a_worker_with_another_database_is_refused(problem, cluster, monkeypatch
 
 def test_nobody_at_the_address(problem, monkeypatch):
     monkeypatch.setattr("rtsim.optimization.cluster.CONNECT_TIMEOUT_S", 1)
-    for address in ("tcp://127.0.0.1:1", "nonsense://x"):
-        with pytest.raises(InputError, match="no Dask scheduler answers"):
-            ClusterEvaluator(problem, address)
+    with pytest.raises(InputError, match="no Dask scheduler answers"):
+        ClusterEvaluator(problem, "tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("address", ["nonsense", "nonsense://x:1", "tcp://127.0.0.1", "127.0.0.1:port", ""])
+def test_what_is_no_address_is_told_at_once(problem, monkeypatch, address):
+    def no_client(*_, **__):
+        raise AssertionError
+
+    monkeypatch.setattr("distributed.Client", no_client)
+    with pytest.raises(InputError, match="is not the address of a Dask scheduler"):
+        ClusterEvaluator(problem, address)

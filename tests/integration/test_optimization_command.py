@@ -94,6 +94,8 @@ def test_ctrl_c_keeps_the_result_and_resume_ends_as_if_nothing_had_been(whole, t
     printed, err = process.communicate(timeout=120)
     assert "Traceback" not in err
     cut = json.loads(printed)
+    # The file says what was done, not what was planned.
+    assert f"{cut['generations']} x 8 candidates" in out.read_text(encoding="utf-8")
     # A machine that froze this test for the length of a search would end it before the signal.
     assert process.returncode == EXIT_INTERRUPTED
     assert cut["interrupted"]
@@ -124,6 +126,29 @@ def test_a_specification_file_and_a_front(tmp_path, capsys):
     assert all(set(point["objectives"]) == {"flapping_peak", "duration"} for point in summary["front"])
 
 
+def test_options_count_before_a_file_is_judged_as_a_whole(tmp_path, capsys):
+    spec = tmp_path / "spec.toml"
+    spec.write_text('objectives = ["flapping_peak", "duration"]\n[search]\ngenerations = 1\npopulation = 4\n')
+    out = ("--out", str(tmp_path / "two.toml"), "--no-check")
+    code, _, err = optimize(capsys, str(spec), *out)
+    assert code == EXIT_BAD_INPUT
+    assert "spec.toml" in "".join(err.split())
+    assert set(answer(capsys, str(spec), *out, "--method", "nsga2")["best"]["objectives"]) == {
+        "flapping_peak",
+        "duration",
+    }
+
+
+def test_a_new_search_keeps_the_old_record_until_it_has_its_own(tmp_path, capsys):
+    record = tmp_path / "a.search.npz"
+    record.write_bytes(b"hours of work")
+    small = ("--generations", "1", "--population", "4", "--out", str(tmp_path / "a.toml"), "--no-check")
+    assert optimize(capsys, *small, "--dask", "nonsense")[0] == EXIT_BAD_INPUT
+    assert record.read_bytes() == b"hours of work"
+    answer(capsys, *small)
+    assert record.read_bytes() != b"hours of work"
+
+
 def test_the_table_for_people(tmp_path, capsys):
     arguments = ("--generations", "1", "--population", "4", "--out", str(tmp_path / "a.toml"))
     code, out, _ = optimize(capsys, *arguments)
@@ -145,7 +170,7 @@ def test_the_table_for_people(tmp_path, capsys):
         (["--resume"], "no record to resume from"),
         (["none.toml"], "does not exist"),
         (["none.toml", "--like", "typical"], "cannot be combined"),
-        (["--dask", "nonsense"], "no Dask scheduler answers"),
+        (["--dask", "nonsense"], "is not the address of a Dask scheduler"),
     ],
 )
 def test_mistakes_are_told_in_a_sentence(arguments, words, tmp_path, monkeypatch, capsys):

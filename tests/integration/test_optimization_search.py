@@ -16,7 +16,7 @@ from rtsim.optimization.search import run_search, start_vectors
 from rtsim.optimization.spec import checked_spec, spec_like
 from rtsim.optimization.stability import path_stability
 from rtsim.simulation import Simulation
-from scenarios.loader import load_scenario
+from scenarios.loader import load_scenario, parse_scenario
 from scenarios.runner import fly
 
 SMALL = {"generations": 4, "population": 8}
@@ -229,6 +229,12 @@ def test_the_robust_variant_judges_by_flights_in_turbulence():
     assert constraints[CONSTRAINTS.index("altitude")] == worst / 15.0 - 1.0
     result = run_search(robust)
     assert result.evaluations == 4
+    # The file asks in calm air for no more than the search asked for in turbulence.
+    scenario, problems = parse_scenario(scenario_text(robust, best_path(robust, result)), file="made")
+    assert problems == []
+    limits = {clause.metric: (clause.minimum, clause.maximum) for clause in scenario.expectations}
+    assert limits["corridor.worst_margin_kt"] == (0.0, None)
+    assert limits["altitude_m.max_deviation"] == (None, 15.0)
 
 
 @pytest.mark.parametrize("reconversion", [False, True])

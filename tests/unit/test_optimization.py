@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import importlib
+<<<<<<< HEAD
 from typing import get_args
+=======
+import io
+>>>>>>> 343570f (Search: damaged records and odd addresses are told, an old record is kept until there is a new one, exact types, named methods, files that say what was done)
 
 import numpy as np
 import pytest
@@ -65,7 +69,13 @@ def test_methods_find_the_best_point_on_a_constraint(name, penalty):
     assert finite == sorted(finite, reverse=True)
 
 
-@pytest.mark.parametrize("name", ["cma-es", "ga"])
+def test_each_method_is_the_one_that_was_named():
+    shape = {"population": 8, "seed": 0, "penalty": False, "objectives": 1, "constraints": len(CONSTRAINTS)}
+    for name, kind in (("ga", "GA"), ("nsga2", "NSGA2")):
+        assert type(make_method(name, STARTS, **shape)._algorithm).__name__ == kind
+
+
+@pytest.mark.parametrize("name", ["cma-es", "ga", "nsga2"])
 def test_a_method_is_a_function_of_its_seed(name):
     _, first = search(name, generations=5)
     np.random.seed(123)  # noqa: NPY002 - numpy's global stream must not matter
@@ -164,14 +174,33 @@ def test_a_record_of_another_search_is_refused(tmp_path):
     Record(path, "this search").add(evaluation())
     with pytest.raises(InputError, match="another search"):
         Record(path, "that search")
-    path.write_bytes(b"not a record")
-    with pytest.raises(InputError, match="not the record of a search"):
-        Record(path, "this search")
-    path.write_bytes(b"")
-    with pytest.raises(InputError, match="not the record of a search"):
-        Record(path, "this search")
     with pytest.raises(OutputError, match="cannot be written"):
         Record(tmp_path / "missing" / "a.npz", "this search").add(evaluation())
+
+
+def damaged_records(whole):
+    yield b"not a record"
+    yield b""
+    yield whole[: len(whole) // 2]
+    yield whole[:200] + bytes(64) + whole[264:]
+    buffer = io.BytesIO()
+    np.save(buffer, np.zeros(3))
+    yield buffer.getvalue()
+    for change in ({"format": 2}, {"sizes": np.array("x")}, {"variables": np.zeros(())}):
+        buffer = io.BytesIO()
+        np.savez(buffer, **(dict(np.load(io.BytesIO(whole))) | change))
+        yield buffer.getvalue()
+
+
+def test_damaged_records_are_told_in_a_sentence(tmp_path):
+    path = tmp_path / "a.search.npz"
+    Record(path, "this search").add(evaluation())
+    for content in damaged_records(path.read_bytes()):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match="not the record of a search") as told:
+            Record(path, "this search")
+        assert "pickle" not in str(told.value)
+        assert not Record(path, "this search", resume=False).generations
 
 
 def test_the_fingerprint_leaves_the_length_out():
@@ -194,6 +223,11 @@ def test_every_path_has_its_constraint_set(name):
 @pytest.mark.parametrize(
     ("text", "key", "words"),
     [
+        ("points = '7'", "points", "valid integer"),
+        ("points = true", "points", "valid integer"),
+        ("[limits]\npitch_deg = true", "limits.pitch_deg", "valid number"),
+        ("[robust]\npilot_noise = 'no'", "robust.pilot_noise", "valid boolean"),
+        ("search = 3", "search", "must be a table"),
         ("points = 0", "points", "greater than or equal to 1"),
         ("colour = 1", "colour", "not a key"),
         ("[search]\nmethod = 'luck'", "search.method", "cma-es"),
