@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -80,7 +81,7 @@ class Claim:
         return {
             "id": self.text.id,
             "holds": self.holds,
-            "measured": dict(self.measured),
+            "measured": {name: _number(value) for name, value in self.measured.items()},
             "expected": dict(self.text.expected),
             "where": self.text.where,
             "claim": self.text.claim,
@@ -90,6 +91,11 @@ class Claim:
             "carried": self.carried,
             "variants": dict(self.variants),
         }
+
+
+def _number(value: Number) -> Number | None:
+    """The value, or None for what JSON has no number for: a flight that never got there."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -338,7 +338,8 @@ FIGURES: tuple[FigurePlan, ...] = (
     FigurePlan(
         9,
         "Typical conversion at 8 deg/s",
-        "The points of Table 1 with the nacelles at 8 deg/s to the next angle, then held.",
+        "The points of Table 1 with the nacelles at 8 deg/s to the next angle, then held. On its way to 50 deg the "
+        "path crosses the power-on stall line of 1980: the nacelles arrive there long before the airspeed.",
         _eight_path,
     ),
     FigurePlan(

@@ -83,12 +83,13 @@ def _claim_table(claims: Sequence[Claim]) -> str:
     rows = []
     for claim in claims:
         text = claim.text
-        verdict = '<td class="yes">holds</td>' if claim.holds else '<td class="no">does not hold</td>'
+        kind, word = ("yes", "holds") if claim.holds else ("no", "does not hold")
         rows.append(
             f'<tr id="{text.id}"><td><code>{text.id}</code><br><small>{_text(text.where)}</small></td>'
-            f"<td>{_text(text.claim)}<br><small>{_text(text.paper)}</small></td>"
-            f"<td>{_text(claim.measured_text)}</td>{verdict}"
-            f"<td>{_text(claim.why)}<br><small>{_text(claim.carried)}</small></td></tr>"
+            f'<td data-name="claim">{_text(text.claim)}<br><small>{_text(text.paper)}</small></td>'
+            f'<td data-name="measured">{_text(claim.measured_text)}</td>'
+            f'<td data-name="verdict" class="{kind}">{word}</td>'
+            f'<td data-name="why">{_text(claim.why)}<br><small>{_text(claim.carried)}</small></td></tr>'
         )
     head = "<tr><th>id</th><th>claim, and what the paper says</th><th>measured</th><th>verdict</th><th>why</th></tr>"
     table = f'<table class="claims"><thead>{head}</thead><tbody>{"".join(rows)}</tbody></table>'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 import string
 from html.parser import HTMLParser
@@ -119,6 +121,13 @@ def test_claim_says_with_whom_else_it_holds():
     assert not Claim(text, True, {}, {}).carried
 
 
+def test_what_was_never_reached_is_null_in_json():
+    text = next(text for text in claim_texts() if text.id == "table1_170_kn_at_60_s")
+    claim = Claim(text, False, {"time_to_170_kt_s": math.nan, "time_to_airplane_s": 58.6}, {})
+    measured = json.loads(json.dumps(claim.to_json(), allow_nan=False))["measured"]
+    assert measured == {"time_to_170_kt_s": None, "time_to_airplane_s": 58.6}
+
+
 class _Checked(HTMLParser):
     def __init__(self):
         super().__init__()
@@ -156,6 +165,8 @@ def test_report_is_well_formed_and_needs_nothing_from_elsewhere(tmp_path, flight
     assert all(source.startswith("data:") for source in checked.sources if source)
     assert {link[1:] for link in checked.links if link} <= checked.ids
     assert "0 of 1 claims hold" in page
+    # Narrow screens show a claim's cells one below the other, each with its name.
+    assert all(f'data-name="{name}"' in page for name in ("claim", "measured", "verdict", "why"))
 
 
 def test_templates_name_only_numbers_with_units_in_their_names():
