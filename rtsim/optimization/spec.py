@@ -204,7 +204,6 @@ def checked_spec(
     return spec
 
 
-
 def _validated(data: Mapping[str, Any], file: str | None) -> SearchSpec:
     """Each value on its own; the first one that is not allowed is told."""
     try:
