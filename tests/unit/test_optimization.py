@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import importlib
-<<<<<<< HEAD
-from typing import get_args
-=======
 import io
->>>>>>> 343570f (Search: damaged records and odd addresses are told, an old record is kept until there is a new one, exact types, named methods, files that say what was done)
+from typing import get_args
 
 import numpy as np
 import pytest
