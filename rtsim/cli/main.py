@@ -16,7 +16,7 @@ from typing import Annotated
 import typer
 
 from rtsim import __version__
-from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError, Terminated
+from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, EXIT_TERMINATED, RtsimError, Terminated
 
 EXIT_INTERNAL_ERROR = 70
 EXIT_BROKEN_PIPE = 141
@@ -140,8 +140,15 @@ def _open_closed_streams() -> None:
             setattr(sys, name, stream)
 
 
-def _raise_terminated(signal_number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of a handler
-    raise Terminated
+_stopped_by: list[int] = []
+"""Signals that asked the process to end: raised inside a compiler's callback they are lost, and it fails later."""
+
+
+def _raise_stop(signal_number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of a handler
+    _stopped_by.append(signal_number)
+    if signal_number == signal.SIGTERM:
+        raise Terminated
+    raise KeyboardInterrupt
 
 
 def _describe(error: OSError) -> str:
@@ -178,6 +185,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         _fail(_describe(error))
         return EXIT_OUTPUT_FAILED
     except Exception:  # noqa: BLE001 - the last resort: a fault of ours, told apart from the user's by its exit code
+        if _stopped_by:
+            return EXIT_TERMINATED if signal.SIGTERM in _stopped_by else EXIT_INTERRUPTED
         import traceback
 
         traceback.print_exc()
@@ -222,8 +231,8 @@ def main() -> None:
     """Entry point of the ``rtsim`` command: handles the signals of the process, then ends it with the exit code."""
     _open_closed_streams()
     # Shells start background jobs with SIGINT ignored; a flight must still end cleanly when it is asked to.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, _raise_terminated)
+    signal.signal(signal.SIGINT, _raise_stop)
+    signal.signal(signal.SIGTERM, _raise_stop)
     sys.exit(run())
 
 
