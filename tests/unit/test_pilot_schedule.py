@@ -187,7 +187,7 @@ def test_the_number_of_processes_does_not_matter() -> None:
 
 
 def test_gains_that_are_missing_or_of_another_grid_are_refused() -> None:
-    with pytest.raises(InputError, match="rtsim model build"):
+    with pytest.raises(InputError, match="rtsim model import FILE --design-pilots"):
         load_pilot_tables(replace(DATABASE, pilot={}))
     pilot = ScheduledPilot.from_arrays(DATABASE.pilot["integrators"])
     with pytest.raises(InputError, match="another database"):
