@@ -16,7 +16,6 @@ from rtsim.corridor import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.storage import load_database
-from rtsim.protection.law_data import SENSOR_COUNT
 from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, protection_data
 from rtsim.protection.monitor import UNIT_SCALE, WATCHED, monitor_tables, sensors_of_rows
 from rtsim.protection.monitor_kernels import FAR, KIND_COUNT, LEVEL_STATE_SIZE, MonitorTables, watch
@@ -74,7 +73,7 @@ class LimitWatch:
         Args:
             row: The frame, shape (SIGNAL_COUNT,); it is copied.
         """
-        if self._fill and row[COLUMN.frame] <= self._frame:
+        if self._fill and row[COLUMN.frame] <= self._waiting[self._fill - 1, COLUMN.frame]:
             self.flush()
         self._waiting[self._fill] = row
         self._fill += 1
@@ -132,7 +131,6 @@ class LimitWatch:
         frames = len(rows)
         margins, levels = np.empty((frames, KIND_COUNT)), np.empty((frames, KIND_COUNT))
         sensors = sensors_of_rows(rows)
-        assert sensors.shape[1] == SENSOR_COUNT
         ahead = np.ascontiguousarray(rows[:, COLUMN.time_to_limit_s])
         watch(self._tables, sensors, ahead, self._dt, self._levels, margins, levels)
         np.minimum(self._worst, margins.min(axis=0), out=self._worst)

@@ -71,6 +71,8 @@ class ChainSnapshot:
     """Their reasons."""
     calls: tuple[int, ...]
     """Calls remembered so far."""
+    clipped: tuple[bool, ...]
+    """Laws that were told to have asked for too much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +143,9 @@ class LawChain:
             InputError: A law cannot be copied.
         """
         calls = tuple(len(calls) for calls in self._calls)
-        return ChainSnapshot(self._copied(self._laws), tuple(self._waiting), tuple(self._held), self.reasons, calls)
+        return ChainSnapshot(
+            self._copied(self._laws), tuple(self._waiting), tuple(self._held), self.reasons, calls, tuple(self._clipped)
+        )
 
     def restore(self, snapshot: ChainSnapshot) -> None:
         """Go back to a snapshot.
@@ -151,6 +155,7 @@ class LawChain:
         """
         self._laws = list(self._copied(snapshot.laws))
         self._waiting, self._held, self.reasons = list(snapshot.waiting), list(snapshot.held), snapshot.reasons
+        self._clipped = list(snapshot.clipped)
         for calls, count in zip(self._calls, snapshot.calls, strict=True):
             del calls[count:]
 

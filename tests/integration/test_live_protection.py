@@ -14,6 +14,7 @@ import scenarios
 from rtsim.cli.main import run
 from rtsim.protection import MarginMonitor
 from rtsim.realtime import FlightControl
+from scenarios.limit_watch import LimitWatch
 from scenarios.options import Overrides
 from scenarios.replay import replay_log
 from scenarios.runner import FlightOutputs
@@ -33,6 +34,11 @@ class Raises(Softens):
         if sensors.time > 0.5:
             raise RuntimeError("no more")
         return super().step(sensors, command, margins, dt)
+
+
+class Greedy(Softens):
+    def step(self, sensors, command, margins, dt):
+        return replace(command, lever=1.5), []
 
 
 class Dawdles(Softens):
@@ -128,6 +134,23 @@ def test_a_law_that_raises_is_named_and_the_flight_goes_on(own_laws: Path, speed
     ]
     assert flight["stick"][135] == flight["pilot_stick"][135]
     assert replay_log(log).same
+
+
+def test_a_law_that_asks_for_too_much_is_named_though_the_warm_up_met_it_first(own_laws: Path) -> None:
+    overrides = Overrides(protection="live_laws:Greedy", duration=0.2)
+    flight = scenarios.fly("hover", speed="max", overrides=overrides)
+    assert [frame for frame, text in told(flight, "law") if "clipped" in text] == [0]
+    assert (flight["lever"] == 1.0).all()
+
+
+def test_a_reset_in_the_first_frames_begins_the_levels_anew() -> None:
+    """Ten rows are looked at together; a reset among them must part them."""
+    rows = scenarios.fly("hover", speed="max", overrides=Overrides(duration=0.2)).rows
+    events: list[object] = []
+    watch = LimitWatch("design", events.append, dt=0.004)
+    for row in (*rows[:4], *rows[:20]):
+        watch.row(row)
+    assert watch._frame == 19  # 4 rows, then two batches of ten; not parted, the last batch would end with row 15
 
 
 def test_calls_that_a_slow_law_missed_live_are_missed_in_the_replay(own_laws: Path) -> None:
