@@ -26,6 +26,8 @@ from rtsim.simulation_data import (
     SimulationState,
     SimulationTables,
 )
+from rtsim.systems.drive_kernels import DEVIATION, engine_power
+from rtsim.systems.flap_kernels import flap_inputs, flap_now
 from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, POUND_FORCE, RPM
 
 
@@ -56,6 +58,19 @@ def programme_at(programme: FloatArray, row: int, time: float) -> float:
 
 
 @inner_kernel
+def scheduled_flap(tables: SimulationTables, state: SimulationState, angle: float) -> float:
+    """Flap deflection of the schedule in the present flight [rad].
+
+    Args:
+        tables: The simulation.
+        state: Its state.
+        angle: Nacelle angle [rad].
+    """
+    u, w = state.x[STATE.u] + state.gusts[G_U], state.x[STATE.w] + state.gusts[G_W]
+    return float(nonlinear.flap_schedule(tables.aircraft.controls, math.sqrt(u**2 + w**2), angle))
+
+
+@inner_kernel
 def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
     """Fill the row with all that is known before the command of this frame; changes no state.
 
@@ -76,6 +91,9 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     state.u[INPUT.gust_u] = gusts[G_U]
     state.u[INPUT.gust_w] = gusts[G_W]
     state.u[INPUT.gust_q] = gusts[G_Q]
+    flap_scheduled = scheduled_flap(tables, state, angle)
+    flap_inputs(tables.systems.flaps, state.flaps, flap_scheduled, state.u)
+    state.u[INPUT.rotor_speed] = state.drive[DEVIATION]
     plant_outputs(tables.aircraft, tables.lpv, x, state.u, angle, (scratch.y, scratch.xdot, scratch.work))
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     through = x[STATE.u] * ct + x[STATE.w] * st
@@ -84,7 +102,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
     _see(tables, state, scratch, airspeed)
     y = scratch.y
-    rotor_speed = tables.aircraft.configuration.rotor_speed
+    rotor_speed = tables.systems.drive.governed_speed + state.drive[DEVIATION]
     power = 2.0 * y[OUTPUT.torque] * rotor_speed
 
     _ask(tables, state, scratch, time)
@@ -119,11 +137,10 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.collective_75_deg] = x[STATE.collective_75] / DEGREE
     row[COLUMN.cyclic_deg] = x[STATE.cyclic_1s] / DEGREE
     row[COLUMN.elevator_deg] = x[STATE.elevator] / DEGREE
-    speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
-    row[COLUMN.flap_deg] = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle) / DEGREE
+    row[COLUMN.flap_deg] = flap_now(state.flaps, flap_scheduled) / DEGREE
     row[COLUMN.thrust_per_rotor_lb] = y[OUTPUT.thrust] / POUND_FORCE
     row[COLUMN.power_shp] = power / HORSEPOWER
-    row[COLUMN.engine_power_shp] = power / HORSEPOWER / TRANSMISSION_EFFICIENCY
+    row[COLUMN.engine_power_shp] = engine_power(state.drive, power) / HORSEPOWER / TRANSMISSION_EFFICIENCY
     row[COLUMN.mast_torque_inlb] = y[OUTPUT.torque] / INCH_POUND
     row[COLUMN.rotor_speed_rpm] = rotor_speed / RPM
     row[COLUMN.margin_kt] = min(scratch.margins[0], scratch.margins[1]) / KNOT

@@ -37,11 +37,14 @@ from rtsim.simulation_data import (
     PilotMode,
     SimulationState,
 )
-from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
-from rtsim.units import DEGREE, INCH_POUND, KNOT
+from rtsim.simulation_setup import FlightSetup, Parts, build_parts, needed_aid_error, start_state
+from rtsim.systems.flap_kernels import FLAP_SETTING
+from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, to_deg
 
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
+SAME_FLAP = deg(0.5)
+"""Flaps closer than this to a setting are at it [rad]."""
 
 __all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
 
@@ -311,11 +314,47 @@ class Simulation:
             on: On or off.
 
         Raises:
-            InputError: There is no such aid.
+            InputError: There is no such aid, or the database does not know the aircraft without it.
         """
         if name not in AIDS:
             raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(AIDS))
+        if not on and name in self._parts.needed_aids:
+            raise needed_aid_error(name)
         self._state.switches[AIDS[name]] = 1.0 if on else 0.0
+
+    def set_flaps(self, angle: float) -> None:
+        """Send the flaps to a setting from this frame on, at their rate; they no longer follow the schedule.
+
+        Args:
+            angle: Flap deflection [rad].
+
+        Raises:
+            InputError: The angle is outside the travel of the flaps, or the database does not know what they do.
+        """
+        nodes = self.tables.systems.flaps.nodes
+        if not float(nodes[0]) <= angle <= float(nodes[-1]):
+            raise InputError(
+                "is outside the travel of the flaps",
+                key="flaps",
+                value=f"{to_deg(angle):g} deg",
+                allowed=f"{to_deg(float(nodes[0])):g} to {to_deg(float(nodes[-1])):g} deg",
+                mend="angles are in radians: rtsim.units.deg converts",
+            )
+        self.set_aid("automatic_flaps", on=False)
+        self._state.flaps[FLAP_SETTING] = angle
+
+    def next_flap_setting(self, step: int) -> float:
+        """The published flap setting beyond the present one [rad]; the last one stays.
+
+        Args:
+            step: 1 down (more flap), -1 up.
+        """
+        setting = float(self._state.flaps[FLAP_SETTING])
+        if setting < 0.0:
+            setting = deg(float(self._observe()[COLUMN.flap_deg]))
+        nodes = self.tables.systems.flaps.nodes
+        beyond = nodes[nodes > setting + SAME_FLAP] if step > 0 else nodes[nodes < setting - SAME_FLAP][::-1]
+        return float(beyond[0]) if beyond.size else setting
 
     def set_fault(self, fault: Fault, on: bool) -> None:
         """Let a failure begin or end with this frame.

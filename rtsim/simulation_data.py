@@ -16,6 +16,7 @@ from rtsim.nacelle.nacelle_kernels import NacelleTables
 from rtsim.pilot.pilot_kernels import PilotTables
 from rtsim.plant_kernels import AircraftFrame
 from rtsim.protection.law_data import ProtectionTables
+from rtsim.systems.settings import Systems
 
 MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
 PilotMode = Literal["mocm", "external", "hold"]
@@ -34,6 +35,7 @@ REFERENCE_AIRSPEED, REFERENCE_RATE = 0, 1
 REFERENCE_SIZE = 2
 # Why a flight ended by itself.
 END_NONE, END_CRASH, END_ATTITUDE, END_NOT_FINITE, END_GENTLE_LANDING, END_HARD_LANDING = 0, 1, 2, 3, 4, 5
+END_ROTOR_SPEED = 6
 END_REASONS = {
     END_NONE: "",
     END_CRASH: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
@@ -41,6 +43,7 @@ END_REASONS = {
     END_NOT_FINITE: "the model diverged: a state is no longer a finite number",
     END_GENTLE_LANDING: "touched down gently, sinking at {sink:.1f} m/s",
     END_HARD_LANDING: "landed hard, sinking at {sink:.1f} m/s",
+    END_ROTOR_SPEED: "the rotors turned too slow or too fast without their governor (80 to 115 % can be flown)",
 }
 """Why a flight ended by itself, by the code in the simulation's clock."""
 # The array handed to the pilot, see rtsim.pilot.pilot_kernels.
@@ -66,6 +69,8 @@ class SimulationTables(NamedTuple):
     """Boundaries and levels."""
     pilot: PilotTables
     """The MOCM's gains and references."""
+    systems: Systems
+    """Flaps and rotor drive."""
     aids: AidTables
     """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
     bare aircraft, nor on controls that are held."""
@@ -102,6 +107,10 @@ class SimulationState(NamedTuple):
     """State of the pilot aids."""
     switches: FloatArray
     """Which aids are on."""
+    flaps: FloatArray
+    """Deflection of the flaps, whether they follow their schedule, and their setting."""
+    drive: FloatArray
+    """Rotor speed less the governed one, engine power, its offset from the throttle's law, whether governed."""
     gusts: FloatArray
     """Turbulence filters, gusts that act or are to come, and what acts now."""
     faults: FloatArray

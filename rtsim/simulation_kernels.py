@@ -9,16 +9,23 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aids.aids_kernels import LAST_SWITCHES, aids_step
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES, aids_step
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, gust_step
 from rtsim.compiled import inner_kernel, kernel
 from rtsim.corridor.corridor_kernels import corridor_level_step
-from rtsim.faults.fault_kernels import fault_actuators_begin, fault_actuators_end, fault_nacelle_rate, fault_update
+from rtsim.faults.fault_kernels import (
+    F_ENGINE,
+    F_POWER,
+    fault_actuators_begin,
+    fault_actuators_end,
+    fault_nacelle_rate,
+    fault_update,
+)
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.nacelle.automatic_kernels import automatic_advance
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
-from rtsim.observation_kernels import observe, programme_at, sense
+from rtsim.observation_kernels import observe, programme_at, scheduled_flap, sense
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_engage, mocm_output_in
 from rtsim.plant_kernels import plant_step
 from rtsim.protection import law_data as law
@@ -37,12 +44,15 @@ from rtsim.simulation_data import (
     END_HARD_LANDING,
     END_NONE,
     END_NOT_FINITE,
+    END_ROTOR_SPEED,
     MODE_EXTERNAL,
     MODE_MOCM,
     Scratch,
     SimulationState,
     SimulationTables,
 )
+from rtsim.systems.drive_kernels import DEVIATION, drive_advance
+from rtsim.systems.flap_kernels import flap_advance
 from rtsim.units import DEGREE, KNOT
 
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
@@ -92,6 +102,9 @@ def _end_code(tables: SimulationTables, state: SimulationState) -> int:
         if upright and sink <= HARD_SINK_RATE:
             return END_HARD_LANDING
         return END_CRASH
+    drive = tables.systems.drive
+    if not drive.lowest <= drive.governed_speed + state.drive[DEVIATION] <= drive.highest:
+        return END_ROTOR_SPEED
     return END_ATTITUDE if abs(pitch) > LARGEST_PITCH else END_NONE
 
 
@@ -221,10 +234,21 @@ def complete(
     u[INPUT.stick] = stick
     u[INPUT.lever] = lever
     before = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    power = 2.0 * scratch.y[OUTPUT.torque] * tables.aircraft.configuration.rotor_speed
+    governed = state.switches[GOVERNOR] != 0.0
+    torque = 2.0 * scratch.y[OUTPUT.torque]
+    power = torque * (tables.systems.drive.governed_speed + state.drive[DEVIATION])
     fault_actuators_begin(
-        tables.faults, state.faults, controls, x, (stick, lever), scratch.path[1, 0], power, dt, scratch.planned
+        tables.faults,
+        state.faults,
+        controls,
+        x,
+        (stick, lever),
+        scratch.path[1, 0],
+        (power, governed),
+        dt,
+        scratch.planned,
     )
+    turn_systems(tables, state, angle, torque, lever)
     state.clock[CLOCK_FLAGS] = plant_step(tables.aircraft, tables.lpv, x, u, scratch.path, dt, scratch.work)
     fault_actuators_end(scratch.planned, x)
     after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
@@ -242,6 +266,23 @@ def complete(
     state.clock[CLOCK_FRAME] += 1.0
     disturb(tables, state, scratch, dt, air_noise)
     state.clock[CLOCK_END] = _end_code(tables, state)
+
+
+@inner_kernel
+def turn_systems(tables: SimulationTables, state: SimulationState, angle: float, torque: float, lever: float) -> None:
+    """Move flaps and rotor speed to the start of the next frame; the inputs of this one stay as ``observe`` set them.
+
+    Args:
+        tables: The simulation.
+        state: Its state at the start of the frame.
+        angle: Nacelle angle [rad].
+        torque: Torque of both masts together [N m].
+        lever: Power lever that acts.
+    """
+    automatic, governed = state.switches[AUTOMATIC_FLAPS] != 0.0, state.switches[GOVERNOR] != 0.0
+    flap_advance(tables.systems.flaps, state.flaps, automatic, scheduled_flap(tables, state, angle), tables.dt)
+    available = state.faults[F_POWER] if state.faults[F_ENGINE] != 0.0 else tables.systems.drive.power[-1]
+    drive_advance(tables.systems.drive, state.drive, governed, torque, lever, available, tables.dt)
 
 
 @inner_kernel

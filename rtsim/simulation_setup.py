@@ -9,7 +9,7 @@ import numpy as np
 
 from rtsim import simulation_kernels as kernels
 from rtsim.aids import AidName, design_aids, switches_of
-from rtsim.aids.aids_kernels import AID_STATE_SIZE, LAST_SWITCHES
+from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
 from rtsim.atmosphere import CALM, AirSpecification
@@ -19,9 +19,13 @@ from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.lpv.aircraft import load_aircraft
+from rtsim.lpv.aircraft import LpvAircraft
+from rtsim.lpv.database import Database
+from rtsim.lpv.flown import flown_database, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
+from rtsim.lpv.storage import load_database
 from rtsim.lpv.tables import Form, prepare_tables
+from rtsim.lpv.variables import AUXILIARY_INPUTS
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
@@ -47,6 +51,9 @@ from rtsim.simulation_data import (
     SimulationState,
     SimulationTables,
 )
+from rtsim.systems import load_systems
+from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
+from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
 from rtsim.units import to_deg, to_kt
 
 Plant = Literal["lpv", "lpv-plain", "nonlinear"]
@@ -85,6 +92,10 @@ class FlightSetup:
     """Let the MOCM's observation and motor noise act."""
     aids: tuple[AidName, ...] = ()
     """Pilot aids on at frame 0; they act on hands and plug-ins, not on the MOCM and not on held controls."""
+    automatic_flaps: bool = True
+    """Whether the flaps follow their schedule at frame 0, whoever flies; else they stay where they are."""
+    governor: bool = True
+    """Whether the governor holds the rotor speed at frame 0, whoever flies."""
     air: AirSpecification = CALM
     """Gusts and turbulence."""
     faults: tuple[Fault, ...] = ()
@@ -112,6 +123,8 @@ class Parts:
     """Standard normals the pilot takes per frame; 0 with the noise off."""
     database_hash: str
     """Content hash of the database."""
+    needed_aids: tuple[AidName, ...]
+    """Aids that cannot be switched off: the database does not say what the aircraft does without them."""
     start_x: FloatArray = field(repr=False)
     """Trimmed state at the start."""
     start_u: FloatArray = field(repr=False)
@@ -135,8 +148,9 @@ def build_parts(setup: FlightSetup) -> Parts:
     Raises:
         InputError: The start has no trim.
     """
-    lpv_aircraft = load_aircraft(setup.database or None)
-    database = lpv_aircraft.database
+    loaded = load_database(setup.database or None)
+    database = flown_database(loaded)
+    lpv_aircraft = LpvAircraft(database)
     nonlinear_aircraft = Xv15.load()
     airspeed, nacelle, altitude = _start(setup)
     if setup.plant == "nonlinear":
@@ -164,6 +178,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
         corridor=load_boundary(setup.corridor, database).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
+        systems=load_systems(own),
         aids=design_aids(database),
         gusts=gust_tables(setup.air),
         faults=fault_tables(setup.faults),
@@ -203,9 +218,37 @@ def build_parts(setup: FlightSetup) -> Parts:
         tables=tables,
         scratch=scratch,
         noise_width=noise_width(tables.pilot) if setup.pilot_noise else 0,
-        database_hash=database.content_hash,
+        database_hash=loaded.content_hash,
+        needed_aids=_needed_aids(setup, loaded),
         start_x=x,
         start_u=u,
+    )
+
+
+def _needed_aids(setup: FlightSetup, database: Database) -> tuple[AidName, ...]:
+    needed: list[AidName] = []
+    if setup.plant != "nonlinear" and not moves_flaps(database):
+        needed.append("automatic_flaps")
+    if setup.plant != "nonlinear" and not turns_rotors(database):
+        needed.append("governor")
+    for name, on in (("automatic_flaps", setup.automatic_flaps), ("governor", setup.governor)):
+        if name in needed and not on:
+            raise needed_aid_error(name)
+    return tuple(needed)
+
+
+def needed_aid_error(name: str) -> InputError:
+    """The refusal to switch an aid off that the database needs.
+
+    Args:
+        name: The aid.
+    """
+    return InputError(
+        "cannot be switched off: the database does not say what the aircraft does without it",
+        key=name,
+        value="off",
+        allowed="on",
+        mend=f"give the database the inputs {', '.join(AUXILIARY_INPUTS)} (docs/lpv.md), or fly the nonlinear plant",
     )
 
 
@@ -232,11 +275,16 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
         aids=np.zeros(AID_STATE_SIZE),
         switches=switches_of(setup.aids),
+        flaps=np.zeros(FLAP_STATE_SIZE),
+        drive=np.zeros(DRIVE_STATE_SIZE),
         gusts=new_gust_state(setup.air, air_normals),
         faults=new_fault_state(),
         protection=np.zeros(LAW_STATE_SIZE),
         clock=clock,
     )
+    state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(setup.automatic_flaps), float(setup.governor)
+    state.flaps[FLAP_FOLLOWS], state.flaps[FLAP_SETTING] = 1.0, NO_SETTING
+    state.drive[GOVERNED] = 1.0
     law_start(parts.tables.protection, state.protection)
     if setup.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
@@ -247,4 +295,4 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     return state
 
 
-__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "start_state"]
+__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "needed_aid_error", "start_state"]

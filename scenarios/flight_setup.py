@@ -51,6 +51,8 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         seed=scenario.seed,
         pilot_noise=scenario.pilot_noise,
         aids=scenario.aids,
+        automatic_flaps=scenario.automatic_flaps,
+        governor=scenario.governor,
         air=scenario.air,
         faults=scenario.faults,
         automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),

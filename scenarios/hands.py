@@ -47,6 +47,14 @@ class HandedFlight(Protocol):
         """
         ...
 
+    def set_flaps(self, angle: float) -> None:
+        """Send the flaps to a setting.
+
+        Args:
+            angle: Flap deflection [rad].
+        """
+        ...
+
     def tell(self, kind: str, text: str) -> None:
         """Make an event that changes nothing.
 
@@ -196,6 +204,10 @@ class Hands:
             on = name not in flight.simulation.aids if request.value == 2.0 else request.value == 1.0
             if on != (name in flight.simulation.aids):
                 flight.switch_aid(name, on=on)
+        elif kind == "flaps":
+            steps = {"up": -1, "down": 1}
+            step = steps.get(request.name)
+            flight.set_flaps(request.value if step is None else flight.simulation.next_flap_setting(step))
         elif kind == "parameter":
             self._settings = self._settings.with_parameter(request.name, request.value)
             self._handler.change(self._settings)

@@ -262,6 +262,8 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         wind=kt(options.wind_kt),
         pilot_noise=options.pilot_noise,
         aids=tuple(dict.fromkeys(options.aids)),
+        automatic_flaps=options.automatic_flaps,
+        governor=options.governor,
         air=air_of(content.air),
         faults=faults_of(content.faults),
         events=tuple(

@@ -67,6 +67,8 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
     targets, host, port, warning = endpoints(options.targets, allow_network=options.allow_network, bind=options.bind)
     stick_map = load_vehicle_map(options.stick_map)
     parameter_file = options.parameter_file or default_parameter_file()
+    always = {"automatic_flaps": scenario.automatic_flaps, "governor": scenario.governor}
+    aids_on = {*scenario.aids, *(name for name, on in always.items() if on)}
     config = MavlinkConfig(
         targets=targets,
         bind_host=host,
@@ -74,7 +76,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         autopilot=options.autopilot,
         rate_hz=float(scenario.rate_hz),
         home=options.home,
-        aids={name: name in scenario.aids for name in AIDS},
+        aids={name: name in aids_on for name in AIDS},
         parameters=stick_settings(stick_map).parameters(),
         parameter_file=str(parameter_file),
         axes={str(control): source for control, source in stick_map.axes.items()},

@@ -19,6 +19,9 @@ from scenarios.flight_setup import setup_from_json, versions
 from telemetry.log_format import LogEvent
 from telemetry.log_reader import FlightLog, read_log
 
+ACTING_KINDS = frozenset({"reset", "pilot", "aid", "flaps", "law", "override"})
+"""Events besides those of the air and of failures that a replay repeats."""
+
 
 @dataclass(frozen=True, slots=True)
 class Difference:
@@ -99,9 +102,7 @@ def fly_recording(simulation: Simulation, recorded: FloatArray, events: Sequence
     Returns:
         The replayed history, shape (rows flown, SIGNAL_COUNT).
     """
-    acting = [
-        event for event in events if event.kind in {"reset", "pilot", "aid", "law", "override", *DISTURBANCE_KINDS}
-    ]
+    acting = [event for event in events if event.kind in {*ACTING_KINDS, *DISTURBANCE_KINDS}]
     replayed = np.empty_like(recorded)
     due = 0
     for row in range(len(recorded)):
@@ -158,14 +159,14 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
             if aid == event.data["aid"]:
                 simulation.set_aid(aid, bool(event.data["on"]))
         return
+    if event.kind == "flaps":
+        simulation.set_flaps(float(event.data["angle"]))
+        return
     if event.kind == "override":
         simulation.set_protection_override(bool(event.data["on"]))
         return
     if event.kind == "law":
-        if simulation.laws is not None and event.data["ended"]:
-            simulation.laws.end(str(event.data["law"]))
-        elif simulation.laws is not None and event.data["what"] == "skipped":
-            simulation.laws.skip(str(event.data["law"]))
+        _act_on_law(simulation, event)
         return
     if event.kind in DISTURBANCE_KINDS:
         simulation.disturb(disturbance_from_event(event.kind, event.data))
@@ -174,6 +175,13 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
     for name in MODES:
         if name == mode:
             simulation.set_pilot(name)
+
+
+def _act_on_law(simulation: Simulation, event: LogEvent) -> None:
+    if simulation.laws is not None and event.data["ended"]:
+        simulation.laws.end(str(event.data["law"]))
+    elif simulation.laws is not None and event.data["what"] == "skipped":
+        simulation.laws.skip(str(event.data["law"]))
 
 
 def _setup(log: FlightLog) -> Any:

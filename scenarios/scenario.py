@@ -20,7 +20,7 @@ PASSIVE_LAWS = frozenset({"off", "monitor"})
 """Protection that changes no command."""
 PilotMode = Literal["mocm", "external", "hold"]
 AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
-"""The pilot aids of ``rtsim.aids``, named here so that reading a file loads no compiled code."""
+"""The aids of ``rtsim.aids`` that act on the controls, named here so that reading a file loads no compiled code."""
 
 START_CONDITIONS: dict[str, tuple[float, float]] = {
     "hover": (0.0, deg(90.0)),
@@ -105,6 +105,10 @@ class Scenario:
     """Whether the MOCM's motor and observation noise is on."""
     aids: tuple[AidName, ...]
     """Pilot aids on at the start; they act on every pilot but the MOCM."""
+    automatic_flaps: bool
+    """Whether the flaps follow their schedule at the start, whoever flies."""
+    governor: bool
+    """Whether the governor holds the rotor speed at the start, whoever flies."""
     air: AirSpecification
     """Gusts and turbulence."""
     faults: tuple[Fault, ...]

@@ -53,6 +53,8 @@ class FlightTable(Strict):
     wind_kt: Annotated[float, Field(ge=-40.0, le=40.0, allow_inf_nan=False)] = 0.0
     pilot_noise: bool = False
     aids: list[AidName] = []
+    automatic_flaps: bool = True
+    governor: bool = True
 
 
 class StartTable(Strict):

@@ -16,6 +16,7 @@ from rtsim.frame import SIGNAL_COUNT, FloatArray
 from rtsim.protection.chain import LawEvent
 from rtsim.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.simulation_data import END_GENTLE_LANDING
+from rtsim.units import to_deg
 from scenarios.disturbances import disturbance_event
 from scenarios.hands import Hands, pilot_modes
 from scenarios.nacelle_laws import NacelleLawFactory, NacelleLawGuard
@@ -232,8 +233,25 @@ class FlightSession:
             name: The aid.
             on: On or off.
         """
+        try:
+            self.simulation.set_aid(name, on)
+        except InputError as error:
+            self._tell("refused", str(error), level="warning")
+            return
         self._tell("aid", f"{name.replace('_', ' ')} {'on' if on else 'off'}", {"aid": name, "on": int(on)})
-        self.simulation.set_aid(name, on)
+
+    def set_flaps(self, angle: float) -> None:
+        """Send the flaps to a setting from the coming frame on; what cannot be done is told and changes nothing.
+
+        Args:
+            angle: Flap deflection [rad].
+        """
+        try:
+            self.simulation.set_flaps(angle)
+        except InputError as error:
+            self._tell("refused", str(error), level="warning")
+            return
+        self._tell("flaps", f"flaps to {to_deg(angle):.0f} deg", {"angle": angle})
 
     def override_protection(self) -> None:
         """Take the authority from the protection law from the coming frame on, or give it back."""

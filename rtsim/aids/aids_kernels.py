@@ -16,6 +16,9 @@ from rtsim.frame import FloatArray
 # Places in the switches; 1 on, 0 off.
 RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4
 AID_COUNT = 5
+"""Aids that act on the controls; the switches of flaps and rotor drive follow."""
+AUTOMATIC_FLAPS, GOVERNOR = 5, 6
+SWITCH_COUNT = 7
 # Places in the state.
 PITCH_REFERENCE, ALTITUDE_REFERENCE, AIRSPEED_REFERENCE = 0, 1, 2
 ALTITUDE_INTEGRAL, AIRSPEED_INTEGRAL, SCHEDULE_AIRSPEED = 3, 4, 5
@@ -240,7 +243,7 @@ def aids_step(
     Args:
         tables: The aids.
         state: Their state, updated in place.
-        switches: Which are on, shape (AID_COUNT,).
+        switches: Which are on, shape (SWITCH_COUNT,).
         x: Aircraft state.
         nacelle: Nacelle angle [rad].
         hands: Stick and lever as the pilot holds them.

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 
 from rtsim.aids.aids_kernels import (
-    AID_COUNT,
     AIRSPEED_HOLD,
     ALTITUDE_HOLD,
     ATTITUDE_RETENTION,
+    AUTOMATIC_FLAPS,
+    GOVERNOR,
     MAP_COUNT,
     MAP_LEVER,
     MAP_LEVER_LIFT,
@@ -20,6 +21,7 @@ from rtsim.aids.aids_kernels import (
     MAP_PITCH_SENSITIVITY,
     MAP_STICK,
     RATE_DAMPING,
+    SWITCH_COUNT,
     TRIM_BIAS,
     AidTables,
 )
@@ -27,15 +29,25 @@ from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.units import deg
 
-AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
+AidName = Literal[
+    "rate_damping",
+    "attitude_retention",
+    "altitude_hold",
+    "airspeed_hold",
+    "trim_bias",
+    "automatic_flaps",
+    "governor",
+]
 AIDS: dict[AidName, int] = {
     "rate_damping": RATE_DAMPING,
     "attitude_retention": ATTITUDE_RETENTION,
     "altitude_hold": ALTITUDE_HOLD,
     "airspeed_hold": AIRSPEED_HOLD,
     "trim_bias": TRIM_BIAS,
+    "automatic_flaps": AUTOMATIC_FLAPS,
+    "governor": GOVERNOR,
 }
-"""Aids by name, with their place in the switches."""
+"""Aids by name, with their place in the switches. The last two are on unless switched off, whoever flies."""
 RIGID_BODY = ("u", "w", "q", "pitch")
 
 
@@ -96,7 +108,7 @@ def switches_of(names: tuple[AidName, ...]) -> FloatArray:
     Args:
         names: Aids to switch on.
     """
-    switches = np.zeros(AID_COUNT)
+    switches = np.zeros(SWITCH_COUNT)
     for name in names:
         switches[AIDS[name]] = 1.0
     return switches

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.aids.aids_kernels import AID_STATE_SIZE, LAST_SWITCHES, aids_engage, aids_step
+from rtsim.aids.aids_kernels import AID_COUNT, AID_STATE_SIZE, LAST_SWITCHES, aids_engage, aids_step
 from rtsim.aids.design import AidName, design_aids, switches_of
 from rtsim.frame import FloatArray
 from rtsim.lpv.aircraft import LpvAircraft
@@ -65,7 +65,7 @@ def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tu
     path = np.tile([nacelle, 0.0, 0.0], (3, 1))
 
     def frame(z: FloatArray, stick: float) -> FloatArray:
-        x, state = z[: x0.size].copy(), np.concatenate([z[x0.size :], switches])
+        x, state = z[: x0.size].copy(), np.concatenate([z[x0.size :], switches[:AID_COUNT]])
         acting, u = acting0.copy(), trim.u.copy()
         aids_step(tables, state, switches, x, nacelle, hands0 + np.array([stick, 0.0]), acting, DT)
         u[:2] = acting

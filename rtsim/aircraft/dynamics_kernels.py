@@ -17,7 +17,7 @@ from rtsim.aircraft.rotor_kernels import (
 )
 from rtsim.aircraft.signals import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
 from rtsim.aircraft.table_kernels import FloatArray, curve
-from rtsim.aircraft.tables import AircraftTables, ControlTables, MassTables
+from rtsim.aircraft.tables import AircraftTables, Configuration, ControlTables, MassTables
 from rtsim.aircraft.tail_kernels import tail_load
 from rtsim.compiled import inner_kernel
 from rtsim.units import GRAVITY
@@ -46,6 +46,41 @@ def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> f
     retracted = min(max((airspeed - start) / (end - start), 0.0), 1.0)
     on_stop = min(max(1.0 - nacelle / controls.downstop_nacelle, 0.0), 1.0)
     return controls.default_flap * (1.0 - retracted * on_stop)
+
+
+@inner_kernel
+def flap_deflection(tables: AircraftTables, u: FloatArray, airspeed: float, nacelle: float) -> float:
+    """Flap deflection that acts: of the configuration or its schedule, moved by the flap inputs [rad].
+
+    Args:
+        tables: The aircraft.
+        u: Inputs.
+        airspeed: Airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+    """
+    flap = tables.configuration.flap
+    if flap < 0.0:
+        flap = flap_schedule(tables.controls, airspeed, nacelle)
+    flap += u[INPUT.flap_0_20] + u[INPUT.flap_20_40] + u[INPUT.flap_40_75]
+    nodes = tables.wing.flap_nodes
+    return min(max(flap, nodes[0]), nodes[nodes.shape[0] - 1])
+
+
+@inner_kernel
+def turning(configuration: Configuration, u: FloatArray) -> Configuration:
+    """The configuration with the rotors at their present speed.
+
+    Args:
+        configuration: Mass, air, rotor speed that is held, flap.
+        u: Inputs.
+    """
+    return Configuration(
+        configuration.mass,
+        configuration.density,
+        configuration.sound_speed,
+        configuration.rotor_speed + u[INPUT.rotor_speed],
+        configuration.flap,
+    )
 
 
 @inner_kernel
@@ -99,7 +134,8 @@ def derivative(
         xdot: Written: state derivative.
         work: Scratch of WORK_COUNT numbers; afterwards holds rotor loads and component loads.
     """
-    air, rotor, mass = tables.configuration, tables.rotor, tables.mass
+    rotor, mass = tables.rotor, tables.mass
+    air = turning(tables.configuration, u)
     nacelle_rate = u[INPUT.nacelle_rate]
     nacelle_acceleration = u[INPUT.nacelle_acceleration]
     ua = x[STATE.u] + u[INPUT.gust_u]
@@ -135,9 +171,7 @@ def derivative(
 
     tip = air.rotor_speed * rotor.radius
     speed = math.sqrt(ua * ua + wa * wa)
-    flap = air.flap
-    if flap < 0.0:
-        flap = flap_schedule(tables.controls, speed, nacelle)
+    flap = flap_deflection(tables, u, speed, nacelle)
     induced = x[STATE.inflow_0] * tip
     force_coefficient = math.sqrt(thrust * thrust + forward * forward) / (
         air.density * math.pi * rotor.radius**2 * tip * tip
@@ -232,7 +266,7 @@ def outputs(
     st, ct = math.sin(pitch), math.cos(pitch)
     y[OUTPUT.thrust] = work[THRUST]
     y[OUTPUT.torque] = work[TORQUE]
-    y[OUTPUT.power] = 2.0 * work[TORQUE] * tables.configuration.rotor_speed
+    y[OUTPUT.power] = 2.0 * work[TORQUE] * (tables.configuration.rotor_speed + u[INPUT.rotor_speed])
     y[OUTPUT.load_factor] = -work[WORK_FORCE_Z] / (tables.configuration.mass * GRAVITY)
     y[OUTPUT.airspeed_rate] = xdot[STATE.u] * ct + xdot[STATE.w] * st + (x[STATE.w] * ct - x[STATE.u] * st) * x[STATE.q]
     # The angle of attack is undefined at rest: SCHEDULING_SPEED along the horizon makes the output smooth there and

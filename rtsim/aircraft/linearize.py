@@ -8,7 +8,7 @@ import numpy as np
 
 from rtsim.aircraft import dynamics_kernels as kernels
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.signals import OUTPUTS
+from rtsim.aircraft.signals import FLAP_INPUTS, INPUT, INPUTS, OUTPUTS, STATE
 from rtsim.aircraft.table_kernels import FloatArray
 
 # Large enough to average over table curvature, small enough for second-order accuracy (docs/model.md).
@@ -18,7 +18,17 @@ STATE_STEPS = np.array(
 
 if TYPE_CHECKING:
     from rtsim.aircraft.model import Xv15
-INPUT_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-3, 0.05, 0.05, 2e-3])
+INPUT_STEPS = {
+    "stick": 1e-3,
+    "lever": 1e-3,
+    "nacelle_rate": 1e-3,
+    "nacelle_acceleration": 1e-3,
+    "gust_u": 0.05,
+    "gust_w": 0.05,
+    "gust_q": 2e-3,
+    "rotor_speed": 0.1,
+}
+"""Steps of the inputs; those of the flaps are taken over their whole interval."""
 NACELLE_STEP = 1e-4
 
 
@@ -26,6 +36,24 @@ def _evaluate(aircraft: Xv15, x: FloatArray, u: FloatArray, nacelle: float) -> F
     xdot, y = np.zeros(x.size), np.zeros(len(OUTPUTS))
     kernels.outputs(aircraft.tables, x, u, nacelle, y, xdot, np.zeros(kernels.WORK_COUNT))
     return np.concatenate([xdot, y])
+
+
+def _flap_column(aircraft: Xv15, trim: TrimPoint, condition: Condition, interval: int) -> FloatArray:
+    """Effect of the flaps in one interval between published settings, wherever in the travel the trim has them.
+
+    A small step at the trim would mix two intervals: the schedule stands at the corner between them.
+    """
+    tables, nacelle, u = aircraft.tables, condition.nacelle_angle, trim.u.copy()
+    speed = float(np.hypot(trim.x[STATE.u] + u[INPUT.gust_u], trim.x[STATE.w] + u[INPUT.gust_w]))
+    for name in FLAP_INPUTS:
+        u[getattr(INPUT, name)] = 0.0
+    present = float(kernels.flap_deflection(tables, u, speed, nacelle))
+    ends = []
+    for node in tables.wing.flap_nodes[interval : interval + 2]:
+        u[INPUT.flap_0_20] = node - present
+        ends.append(_evaluate(aircraft, trim.x, u, nacelle))
+    low, high = tables.wing.flap_nodes[interval : interval + 2]
+    return np.asarray((ends[1] - ends[0]) / (high - low))
 
 
 def linearize_at(aircraft: Xv15, condition: Condition, trim: TrimPoint, *, step_scale: float) -> LinearModel:
@@ -44,7 +72,11 @@ def linearize_at(aircraft: Xv15, condition: Condition, trim: TrimPoint, *, step_
         shift[i] = size
         above, below = _evaluate(aircraft, x + shift, u, nacelle), _evaluate(aircraft, x - shift, u, nacelle)
         columns.append((above - below) / (2 * size))
-    for i, size in enumerate(INPUT_STEPS * step_scale):
+    for i, variable in enumerate(INPUTS):
+        if variable.name in FLAP_INPUTS:
+            columns.append(_flap_column(aircraft, trim, condition, FLAP_INPUTS.index(variable.name)))
+            continue
+        size = INPUT_STEPS[variable.name] * step_scale
         shift = np.zeros(u.size)
         shift[i] = size
         above, below = _evaluate(aircraft, x, u + shift, nacelle), _evaluate(aircraft, x, u - shift, nacelle)

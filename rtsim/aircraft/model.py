@@ -51,7 +51,7 @@ class Xv15:
 
         Args:
             x: State, shape (17,), order of ``signals.STATES``.
-            u: Inputs, shape (7,), order of ``signals.INPUTS``.
+            u: Inputs, shape (11,), order of ``signals.INPUTS``.
             nacelle_angle: Nacelle angle [rad].
         """
         xdot = np.zeros(len(STATES))

@@ -49,6 +49,10 @@ INPUTS: tuple[Variable, ...] = (
     Variable("gust_u", "m/s", "Gust added to the air-relative velocity along body x"),
     Variable("gust_w", "m/s", "Gust added to the air-relative velocity along body z"),
     Variable("gust_q", "rad/s", "Gust added to the air-relative pitch rate"),
+    Variable("flap_0_20", "rad", "Flap deflection between 0 and 20 deg, less that of the flap schedule"),
+    Variable("flap_20_40", "rad", "Flap deflection between 20 and 40 deg, less that of the flap schedule"),
+    Variable("flap_40_75", "rad", "Flap deflection between 40 and 75 deg, less that of the flap schedule"),
+    Variable("rotor_speed", "rad/s", "Rotor speed less the one that is held"),
 )
 OUTPUTS: tuple[Variable, ...] = (
     Variable("thrust", "N", "Thrust of one rotor along its mast"),
@@ -59,6 +63,10 @@ OUTPUTS: tuple[Variable, ...] = (
     Variable("wing_angle_of_attack", "rad", "Angle of attack at which the wing tables are entered"),
     Variable("flapping", "rad", "Magnitude of the gimbal flapping relative to the mast"),
 )
+
+FLAP_INPUTS = ("flap_0_20", "flap_20_40", "flap_40_75")
+"""Inputs that move the flaps: one for each interval between published settings, in which the aerodynamics are linear
+in the deflection. Together they are the flap deflection less that of the schedule."""
 
 _States = namedtuple("_States", [v.name for v in STATES])  # type: ignore[misc]
 _Inputs = namedtuple("_Inputs", [v.name for v in INPUTS])  # type: ignore[misc]

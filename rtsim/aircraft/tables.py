@@ -17,9 +17,9 @@ class Configuration(NamedTuple):
     sound_speed: float
     """Speed of sound [m/s]."""
     rotor_speed: float
-    """Rotor speed, held [rad/s]."""
+    """Rotor speed that the governor holds [rad/s]."""
     flap: float
-    """Flap deflection [rad]; negative means the flap schedule."""
+    """Flap deflection [rad]; negative means the flap schedule. The flap inputs add to it."""
 
 
 class RotorTables(NamedTuple):

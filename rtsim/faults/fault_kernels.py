@@ -262,7 +262,7 @@ def fault_actuators_begin(
     x: FloatArray,
     commands: tuple[float, float],
     nacelle_angle: float,
-    power: float,
+    drive: tuple[float, bool],
     dt: float,
     planned: FloatArray,
 ) -> None:
@@ -279,12 +279,14 @@ def fault_actuators_begin(
         x: Aircraft state at the start of the step; failed actuators are changed.
         commands: Stick and lever of the step.
         nacelle_angle: Nacelle angle in the middle of the step [rad].
-        power: Shaft power of both rotors now [W].
+        drive: Shaft power of both rotors now [W], and whether the rotor-speed governor is on.
         dt: Length of the step [s].
         planned: Written: angles of the actuators after the step; NaN where the plant's own are right, shape (3,).
     """
     planned[0] = planned[1] = planned[2] = math.nan
-    limited = state[F_ENGINE] != 0.0
+    power, governed = drive
+    # Without its governor the rotor slows where the power is short; nothing takes the collective back.
+    limited = governed and state[F_ENGINE] != 0.0
     failed = state[F_ACTUATOR] != 0.0 or state[F_ACTUATOR + ACTUATOR_BLOCK] != 0.0
     failed = failed or state[F_ACTUATOR + 2 * ACTUATOR_BLOCK] != 0.0
     if not (limited or failed):

@@ -18,6 +18,8 @@ from rtsim.lpv.schedule_kernels import (
     FORM_PLAIN,
     FORM_STITCHED,
     R_ALTITUDE,
+    R_AUXILIARY,
+    R_AUXILIARY_COLUMN,
     R_FORM,
     R_INPUTS,
     R_NACELLE_ACCELERATION,
@@ -39,6 +41,7 @@ from rtsim.lpv.schedule_kernels import (
     FloatArray,
     IntArray,
     LpvTables,
+    auxiliary_act,
     blend,
     locate,
     rows_at,
@@ -80,13 +83,16 @@ def _apply(
     columns: FloatArray,
     deviation: FloatArray,
     total: FloatArray,
+    of_inputs: int,
 ) -> None:
-    """Evaluate the blended model at (x, u). Views come from the caller: making them here costs as much as the sums."""
+    """Evaluate the blended model at (x, u) with the first so many inputs.
+
+    Views come from the caller: making them here costs as much as the sums.
+    """
     roles = tables.roles
     states = roles[R_STATES]
     rows = roles[R_ROWS]
     of_states = tables.state_columns.shape[0]
-    of_inputs = tables.input_columns.shape[0]
     for c in range(of_states):
         column = tables.state_columns[c]
         deviation[c] = x[column] - reference[column]
@@ -125,6 +131,18 @@ def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
 
 
 @inner_kernel
+def _acting(tables: LpvTables, u: FloatArray) -> tuple[int, int]:
+    """How many active columns of B are needed, and the length of a cell up to the last of them."""
+    of_inputs = tables.input_columns.shape[0]
+    block = tables.cells.shape[3]
+    if not auxiliary_act(tables, u):
+        needed = tables.roles[R_AUXILIARY_COLUMN]
+        block -= (of_inputs - needed) * tables.roles[R_ROWS]
+        of_inputs = needed
+    return of_inputs, block
+
+
+@inner_kernel
 def lpv_derivative(
     tables: LpvTables, x: FloatArray, u: FloatArray, nacelle_angle: float, xdot: FloatArray, work: FloatArray
 ) -> None:
@@ -141,7 +159,7 @@ def lpv_derivative(
         work: Scratch of ``work_size(tables)`` values.
     """
     inputs_end = W_BLEND + tables.roles[R_STATES] + tables.roles[R_INPUTS]
-    block = tables.cells.shape[3]
+    of_inputs, block = _acting(tables, u)
     sums, scratch = rows_at(tables), scratch_at(tables)
     i, j = locate(tables, x, u, nacelle_angle, work)
     blend(tables.cells, i, j, block, work, work[W_BLEND : W_BLEND + block])
@@ -154,6 +172,7 @@ def lpv_derivative(
         work[inputs_end : W_BLEND + block],
         work[scratch:],
         work[sums:scratch],
+        of_inputs,
     )
 
 
@@ -178,6 +197,8 @@ def lpv_outputs(
     rows = roles[R_OUTPUT_ROWS]
     i, j = locate(tables, x, u, nacelle_angle, work)
     block = tables.output_cells.shape[3]
+    acting = inputs if auxiliary_act(tables, u) else roles[R_AUXILIARY]
+    block -= (inputs - acting) * rows
     model = work[W_BLEND : W_BLEND + max(block, states + inputs)]
     blend(tables.cells, i, j, states + inputs, work, model)
     deviation = work[scratch_at(tables) :]
@@ -192,7 +213,7 @@ def lpv_outputs(
     for k in range(rows):
         total[k] = model[k]
     position = rows
-    for column in range(states + inputs):
+    for column in range(states + acting):
         d = deviation[column]
         for k in range(rows):
             total[k] += model[position + k] * d
@@ -224,7 +245,7 @@ def lpv_step(
     refresh = roles[R_REFRESH]
     rate = roles[R_NACELLE_RATE]
     acceleration = roles[R_NACELLE_ACCELERATION]
-    block = tables.cells.shape[3]
+    of_inputs, block = _acting(tables, u)
     scratch = scratch_at(tables)
     model = work[W_BLEND : W_BLEND + block]
     reference = work[W_BLEND : W_BLEND + states + inputs]
@@ -254,7 +275,7 @@ def lpv_step(
             i, j = locate(tables, stage_x, stage_u, nacelle_path[row, 0], work)
             whole = refresh == REFRESH_EVERY_STAGE or stage == 0
             blend(tables.cells, i, j, block if whole else states + inputs + row_sums.shape[0], work, model)
-        _apply(tables, stage_x, stage_u, slope, reference, columns, deviation, row_sums)
+        _apply(tables, stage_x, stage_u, slope, reference, columns, deviation, row_sums, of_inputs)
         weight = 2.0 if 0 < stage < 3 else 1.0
         ahead = dt if stage == 2 else 0.5 * dt
         for k in range(states):

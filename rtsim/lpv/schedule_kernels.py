@@ -68,7 +68,11 @@ R_OUTPUT_ROWS = 13
 R_REFRESH = 14
 R_GUST_U = 15
 R_GUST_W = 16
-R_COUNT = 17
+R_AUXILIARY = 17
+"""Number of the first of the last inputs that are zero in most frames; the number of inputs where there are none."""
+R_AUXILIARY_COLUMN = 18
+"""The same, counted in active columns of B."""
+R_COUNT = 19
 
 # positions in the work array; the sections after the last are laid out by `work_size`
 W_FLAGS = 0
@@ -141,6 +145,20 @@ def work_size(tables: LpvTables) -> int:
         The number of float64 values.
     """
     return int(scratch_at(tables) + 4 * tables.roles[R_STATES] + 2 * tables.roles[R_INPUTS])
+
+
+@inner_kernel
+def auxiliary_act(tables: LpvTables, u: FloatArray) -> bool:
+    """Tell whether any of the inputs acts that are zero in most frames; where none does, their columns are left out.
+
+    Args:
+        tables: Prepared tables.
+        u: Total input (nu,).
+    """
+    act = False
+    for k in range(tables.roles[R_AUXILIARY], tables.roles[R_INPUTS]):
+        act = act or u[k] != 0.0
+    return act
 
 
 @inner_kernel

@@ -13,6 +13,7 @@ from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.schedule_kernels import LpvTables
 from rtsim.lpv.variables import (
+    AUXILIARY_INPUTS,
     GUST_INPUTS,
     NACELLE_INPUTS,
     RIGID_BODY_STATES,
@@ -76,6 +77,8 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
     roles[kernels.R_ROWS] = padded
     roles[kernels.R_OUTPUT_ROWS] = _padded(len(database.outputs))
     roles[kernels.R_REFRESH] = REFRESHES[refresh]
+    roles[kernels.R_AUXILIARY] = _first_auxiliary(database)
+    roles[kernels.R_AUXILIARY_COLUMN] = np.count_nonzero(input_columns < roles[kernels.R_AUXILIARY])
     cells = np.concatenate(
         [
             x_ref,
@@ -144,6 +147,16 @@ def _roles(database: Database, form: int, level: int) -> npt.NDArray[np.int64]:
     roles[kernels.R_INPUTS] = len(database.inputs)
     roles[kernels.R_OUTPUTS] = len(database.outputs)
     return roles
+
+
+def _first_auxiliary(database: Database) -> int:
+    """Number of the first of the last inputs that are zero in most frames and in every trim."""
+    first = len(database.inputs)
+    while first > 0 and database.inputs[first - 1].name in AUXILIARY_INPUTS:
+        if np.any(database.u_ref[..., first - 1]):
+            break
+        first -= 1
+    return first
 
 
 def _subtract_rigid_body(database: Database, x_ref: FloatArray, A: FloatArray, xdot_ref: FloatArray) -> None:

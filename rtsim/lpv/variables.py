@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rtsim.aircraft.signals import Variable
+from rtsim.aircraft.signals import FLAP_INPUTS, Variable
 from rtsim.errors import InputError
 
 __all__ = [
+    "AUXILIARY_INPUTS",
+    "FLAP_INPUTS",
     "GUST_INPUTS",
     "NACELLE_INPUTS",
     "RIGID_BODY_STATES",
@@ -25,6 +27,10 @@ NACELLE_INPUTS = ("nacelle_rate", "nacelle_acceleration")
 """Inputs that the step fills from the nacelle path where the database has them."""
 GUST_INPUTS = ("gust_u", "gust_w")
 """Inputs that add to u and w in the aerodynamics, and so in the scheduling of the forms where these stand alone."""
+
+
+AUXILIARY_INPUTS = (*FLAP_INPUTS, "rotor_speed")
+"""Inputs that are zero while flaps and rotor speed are where schedule and governor have them; they stand last."""
 
 
 def position(variables: Sequence[Variable], name: str) -> int:

@@ -30,7 +30,7 @@ _AXIS_KEYS = {"w": (0, 1.0), "s": (0, -1.0), "d": (1, 1.0), "a": (1, -1.0), "e":
 _ARROWS = {"\x1b[A": "w", "\x1b[B": "s", "\x1b[C": "d", "\x1b[D": "a", "\x1bOA": "w", "\x1bOB": "s"}
 _LEVER_KEYS = {"r": LEVER_STEP, "f": -LEVER_STEP, "R": 5 * LEVER_STEP, "F": -5 * LEVER_STEP}
 _HELD_KEYS = {"m": 5, "n": 4}
-_ONCE_KEYS = {"t": 6, " ": 7, "h": 8, "p": 9, "+": 11, "-": 12, "o": 13, "0": 14}
+_ONCE_KEYS = {"t": 6, " ": 7, "h": 8, "p": 9, "+": 11, "-": 12, "o": 13, "0": 14, "u": 15, "v": 16, "b": 17, "g": 18}
 KEY_HELP = (
     ("w s, up down", "stick forward and back"),
     ("a d, left right", "stick left and right (shown, does not act)"),
@@ -38,6 +38,8 @@ KEY_HELP = (
     ("m, n", "hold: nacelles to the airplane, to the helicopter"),
     ("+ -", "trim nose down, up"),
     ("t, h", "rate damping, attitude retention on or off"),
+    ("v b", "flaps down, up one setting (0, 20, 40, 75 deg)"),
+    ("u, g", "automatic flaps, rotor-speed governor on or off"),
     ("p", "hand over: virtual pilot, you, held"),
     ("space, 0", "freeze or go on, back to the start"),
     ("o", "arm or disarm"),
@@ -63,6 +65,10 @@ KEYBOARD_MAP = GamepadMap(
         "trim_aft": 12,
         "arm": 13,
         "reset": 14,
+        "automatic_flaps": 15,
+        "flaps_down": 16,
+        "flaps_up": 17,
+        "governor": 18,
     },
 )
 """The keyboard in terms of a gamepad."""

@@ -33,6 +33,10 @@ Function = Literal[
     "pilot",
     "trim_forward",
     "trim_aft",
+    "automatic_flaps",
+    "flaps_up",
+    "flaps_down",
+    "governor",
 ]
 """What a button of the vehicle can do."""
 DeviceFunction = Literal[Function, "arm", "reset", "lever_up", "lever_down"]

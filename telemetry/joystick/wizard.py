@@ -24,6 +24,9 @@ BUTTON_QUESTIONS: tuple[tuple[DeviceFunction, str], ...] = (
     ("pilot", "Press the button that hands over between virtual pilot and you"),
     ("rate_damping", "Press the button that switches rate damping"),
     ("attitude_retention", "Press the button that switches attitude retention"),
+    ("flaps_up", "Press the button that takes the flaps UP one setting"),
+    ("flaps_down", "Press the button that takes the flaps DOWN one setting"),
+    ("automatic_flaps", "Press the button that switches automatic flaps"),
     ("reset", "Press the button that goes back to the start"),
 )
 """Function and what the user is asked to do; every one can be left out."""

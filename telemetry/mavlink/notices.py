@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from itertools import pairwise
 from typing import NamedTuple
 
 from telemetry.mavlink.peers import HEARTBEAT_WARNING_S, Peer, TokenBucket
@@ -15,6 +16,11 @@ TEXT_LENGTH = 50
 _TEXTS_PER_S, _TEXT_BURST, _MOST_WAITING = 2.0, 4.0, 12
 _FLAPPING_WARNING_DEG, _FLAPPING_CLEAR_DEG = 10.0, 9.0
 _TORQUE_WARNING_PCT, _TORQUE_CLEAR_PCT = 100.0, 97.0
+_ROTOR_LOW_PCT, _ROTOR_HIGH_PCT, _ROTOR_CLEAR_PCT = 95.0, 105.0, 1.0
+"""Rotor speed outside these is worth a warning; ours, no operating limits were found."""
+_FLAP_SPEEDS = ((0.0, 260.0), (20.0, 220.0), (40.0, 170.0), (75.0, 100.0))
+"""Flap setting [deg] and the fastest airspeed with it [kn] (NASA CR-166536)."""
+_FLAP_SPEED_SLACK_KT = 1.0
 _REPEAT_S = 5.0
 _LEVELS = {1: ("caution", NOTICE), 2: ("warning", WARNING), 3: ("EXCEEDED", CRITICAL)}
 
@@ -41,7 +47,7 @@ class NoticeBoard:
         self._bucket = TokenBucket(_TEXTS_PER_S, _TEXT_BURST, now)
         self._said: dict[str, float] = {}
         self._level = 0
-        self._flapping = self._torque = False
+        self._flapping = self._torque = self._rotor = self._flap_speed = False
 
     def say(self, severity: int, text: str) -> None:
         """Add a text; when too many wait, the least urgent and oldest is dropped.
@@ -108,7 +114,22 @@ class NoticeBoard:
                 self.say(WARNING, f"Flapping {flapping:.1f} deg")
             if high_torque and not self._torque:
                 self.say(WARNING, f"Mast torque {torque:.0f} %")
+            self._watch_rotor_and_flaps(state)
         self._level, self._flapping, self._torque = level, high_flapping, high_torque
+
+    def _watch_rotor_and_flaps(self, state: FlightState) -> None:
+        """Say when the rotors without their governor, or flaps by hand, are where they should not be."""
+        rotor = state.rotor_speed_pct
+        slack = _ROTOR_CLEAR_PCT if self._rotor else 0.0
+        off_speed = not _ROTOR_LOW_PCT + slack <= rotor <= _ROTOR_HIGH_PCT - slack
+        if off_speed and not self._rotor:
+            self.say(WARNING, f"Rotor speed {rotor:.0f} %")
+        flap, airspeed = state.value("flap_deg"), state.value("airspeed_kt")
+        limit = _flap_limit(flap)
+        fast = airspeed > limit + (0.0 if self._flap_speed else _FLAP_SPEED_SLACK_KT)
+        if fast and not self._flap_speed:
+            self.say(WARNING, f"Flaps {flap:.0f} deg: {limit:.0f} kn is the limit")
+        self._rotor, self._flap_speed = off_speed, fast
 
     def watch_peer(self, peer: Peer, now: float) -> None:
         """Say when a ground station's heartbeat goes missing and when it is back.
@@ -125,3 +146,11 @@ class NoticeBoard:
         elif peer.missed and not missing:
             self.say(INFO, f"Ground station {peer.address[0]}:{peer.address[1]} back")
         peer.missed = missing
+
+
+def _flap_limit(flap: float) -> float:
+    """Fastest airspeed with the flaps so far out, linear between the published settings [kn]."""
+    for (low, fast), (high, slow) in pairwise(_FLAP_SPEEDS):
+        if flap <= high:
+            return fast + (slow - fast) * (flap - low) / (high - low)
+    return _FLAP_SPEEDS[-1][1]

@@ -38,6 +38,7 @@ class Parameter:
 
 
 RESET, NACELLE_COMMAND, PILOT, ARM_NEUTRAL = "XV_RESET", "XV_NAC_CMD", "XV_PILOT", "XV_ARM_NEUTRAL"
+FLAP_COMMAND = "XV_FLAP_CMD"
 LOSS_TIME, OWNER_TIME, LEVER_RANGE, WARNINGS = "XV_MC_LOSS_T", "XV_OWNER_T", "XV_Z_BIPOLAR", "XV_WARN"
 
 AID_PARAMETERS: dict[str, tuple[str, str]] = {
@@ -47,7 +48,7 @@ AID_PARAMETERS: dict[str, tuple[str, str]] = {
     "airspeed_hold": ("XV_SPD_HOLD", "Airspeed hold: 1 on, 0 off."),
     "trim_bias": ("XV_TRIM_BIAS", "Bias schedule that keeps the trimmed stick near its centre: 1 on, 0 off."),
     "automatic_flaps": ("XV_AUTO_FLAP", "Flaps move by themselves with airspeed and nacelle angle: 1 on, 0 off."),
-    "governor": ("XV_GOVERNOR", "Rotor-speed governor: 1 on, 0 off."),
+    "governor": ("XV_GOVERNOR", "Rotor-speed governor: 1 on; 0 off: the lever is throttle and collective."),
 }
 """Parameter name and description of every pilot aid there may be; a vehicle has those its flight has."""
 
@@ -55,6 +56,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(RESET, 0, 0, 1, "", "1 re-trims at the start condition; reads back 0.", choices=True, stored=False),
     Parameter(PILOT, 1, 0, 2, "", "Who flies: 0 virtual pilot, 1 your sticks, 2 held.", choices=True, stored=False),
     Parameter(NACELLE_COMMAND, 90, 0, 90, "deg", "Nacelle angle to go to, 90 helicopter, 0 airplane.", stored=False),
+    Parameter(FLAP_COMMAND, 40, 0, 75, "deg", "Flap setting to go to; switches automatic flaps off.", stored=False),
     Parameter("XV_NAC_MODE", 0, 0, 1, "", "Nacelle switch: 0 moves while held, 1 runs to detents.", choices=True),
     Parameter("XV_NAC_RATE", 7.5, 0.5, 7.5, "deg/s", "Nacelle rate of switch and commands."),
     Parameter(LOSS_TIME, 0.5, 0.2, 10, "s", "Sticks count as lost after this time without input."),
@@ -67,7 +69,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter("XV_STK_SCALE", 1, 0.1, 1, "", "Stick reached at full deflection, part of half travel."),
     Parameter("XV_TRIM_RATE", 0.1, 0.01, 1, "1/s", "Rate of the stick trim buttons, half travels per second."),
     Parameter(ARM_NEUTRAL, 0.2, 0.05, 2, "", "Sticks must be this close to their centre to arm."),
-    Parameter(WARNINGS, 1, 0, 1, "", "Corridor, flapping and torque warnings as STATUSTEXT.", choices=True),
+    Parameter(WARNINGS, 1, 0, 1, "", "Corridor, flapping, torque, rotor and flap speed warnings.", choices=True),
 )
 """Every parameter but those of the pilot aids."""
 

@@ -23,11 +23,24 @@ STANDARD_BUTTONS: dict[str, int] = {
     "freeze": 7,
     "attitude_retention": 8,
     "pilot": 9,
+    "automatic_flaps": 10,
     "trim_forward": 11,
     "trim_aft": 12,
+    "flaps_up": 13,
+    "flaps_down": 14,
+    "governor": 15,
 }
 """Button number of each function."""
-EDGE_BUTTONS = ("rate_damping", "freeze", "attitude_retention", "pilot")
+EDGE_BUTTONS = (
+    "rate_damping",
+    "freeze",
+    "attitude_retention",
+    "pilot",
+    "automatic_flaps",
+    "flaps_up",
+    "flaps_down",
+    "governor",
+)
 """Functions that act once when their button goes down; the others act while it is held."""
 _IGNORE = 65535
 

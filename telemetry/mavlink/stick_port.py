@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 MANUAL_CONTROL, OVERRIDE = 69, 70
 """Ids of the two messages that carry sticks."""
+FLAP_STEPS = {"flaps_up": "up", "flaps_down": "down"}
+"""Buttons that move the flaps to their next setting."""
 
 
 class StickPort:
@@ -80,5 +82,7 @@ class StickPort:
                 self._vehicle.request(Request("aid", function, 2.0))
         elif function == "freeze":
             self._vehicle.request(Request("freeze"))
+        elif function in FLAP_STEPS:
+            self._vehicle.request(Request("flaps", FLAP_STEPS[function]))
         elif function == "pilot":
             self._vehicle.request(Request("pilot", "next"))

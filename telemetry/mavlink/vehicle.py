@@ -31,6 +31,7 @@ from telemetry.mavlink.messages import MessageFactory
 from telemetry.mavlink.modes import offered_modes
 from telemetry.mavlink.notices import INFO, WARNING, NoticeBoard
 from telemetry.mavlink.parameters import (
+    FLAP_COMMAND,
     NACELLE_COMMAND,
     OWNER_TIME,
     WARNINGS,
@@ -199,6 +200,7 @@ class Vehicle:
             self.board.say(INFO, "Flight reset")
         if first and self.state.started:
             self.store.set(NACELLE_COMMAND, min(max(round(self.state.value("nacelle_deg"), 1), 0.0), 90.0))
+            self.store.set(FLAP_COMMAND, min(max(round(self.state.value("flap_deg"), 1), 0.0), 75.0))
 
     def request(self, request: Request) -> None:
         """Ask the flight for something.

@@ -22,6 +22,7 @@ LAYERS = (
     ("rtsim.lpv",),
     ("rtsim.nacelle",),
     ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),
+    ("rtsim.systems",),
     ("rtsim.plant_kernels",),
     ("rtsim.simulation_data",),
     ("rtsim.observation_kernels",),

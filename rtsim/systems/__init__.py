@@ -1,0 +1,7 @@
+"""Flaps and rotor drive: what moves the flaps, and what the rotor speed does with and without its governor."""
+
+from rtsim.systems.drive_kernels import DriveTables
+from rtsim.systems.flap_kernels import FlapTables
+from rtsim.systems.settings import Systems, load_systems
+
+__all__ = ["DriveTables", "FlapTables", "Systems", "load_systems"]

@@ -1,0 +1,108 @@
+"""Compiled rotor drive: both rotors and what turns with them as one inertia between engine power and rotor torque.
+
+With the governor on, the engines give whatever holds the rotor speed: it is exactly the governed one, as in the trims.
+With the governor off, engine power follows the throttle, which moves with the power lever, and the rotors turn as fast
+as power and torque let them. Rotor speed is an input of the aircraft, as the nacelle angle is: the acceleration of the
+shaft does nothing else to an aircraft with two rotors that turn in opposite directions.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from rtsim.compiled import inner_kernel
+from rtsim.frame import FloatArray
+
+DEVIATION, ENGINE_POWER, THROTTLE_OFFSET, GOVERNED = 0, 1, 2, 3
+"""Places in the state: rotor speed less the governed one [rad/s]; shaft power that the engines give, and what it is
+above that of the throttle's law [W]; whether the governor was on in the frame before (0, 1)."""
+DRIVE_STATE_SIZE = 4
+_SAME_SPEED = 1e-6
+"""The governor takes a rotor speed this close to the wanted one as reached [rad/s]."""
+
+
+class DriveTables(NamedTuple):
+    """What the kernels know of the rotor drive. SI."""
+
+    governed_speed: float
+    """Rotor speed that the governor holds [rad/s]."""
+    inertia: float
+    """Moment of inertia of all that turns with the rotors, as felt at the masts [kg m^2]."""
+    lever: FloatArray
+    """Power lever of the throttle's law, ascending, 0 to 1, shape (n,)."""
+    power: FloatArray
+    """Shaft power of both engines at these levers [W], shape (n,)."""
+    lag: float
+    """Time constant of the engines' power [s]."""
+    recovery: float
+    """Time constant with which the governor brings the rotor speed back [s]."""
+    lowest: float
+    """Slowest rotor speed that can be flown [rad/s]."""
+    highest: float
+    """Fastest rotor speed that can be flown [rad/s]."""
+
+
+@inner_kernel
+def throttle_power(tables: DriveTables, lever: float) -> float:
+    """Shaft power of both engines at a power lever by the throttle's law [W].
+
+    Args:
+        tables: The drive.
+        lever: Power lever, 0 to 1.
+    """
+    last = tables.lever.shape[0] - 1
+    k = 0
+    while k < last - 1 and tables.lever[k + 1] <= lever:
+        k += 1
+    share = (lever - tables.lever[k]) / (tables.lever[k + 1] - tables.lever[k])
+    share = min(max(share, 0.0), 1.0)
+    return float(tables.power[k] + share * (tables.power[k + 1] - tables.power[k]))
+
+
+@inner_kernel
+def engine_power(state: FloatArray, needed: float) -> float:
+    """Shaft power that the engines give now [W].
+
+    Args:
+        state: Drive state.
+        needed: Shaft power that the rotors take [W].
+    """
+    return needed if state[GOVERNED] != 0.0 and state[DEVIATION] == 0.0 else state[ENGINE_POWER]
+
+
+@inner_kernel
+def drive_advance(
+    tables: DriveTables, state: FloatArray, governed: bool, torque: float, lever: float, available: float, dt: float
+) -> None:
+    """Turn the rotors over one frame.
+
+    Switching the governor off keeps the engines at the power they give; from there the lever moves it.
+
+    Args:
+        tables: The drive.
+        state: Drive state, changed in place.
+        governed: Whether the governor is on.
+        torque: Torque of both masts together [N m].
+        lever: Power lever that acts, 0 to 1.
+        available: Largest shaft power of both engines [W].
+        dt: Length of the frame [s].
+    """
+    speed = tables.governed_speed + state[DEVIATION]
+    needed = torque * speed
+    present = engine_power(state, needed)
+    if governed:
+        state[GOVERNED] = 1.0
+        if state[DEVIATION] == 0.0:
+            state[ENGINE_POWER] = needed
+            return
+        wanted = needed - tables.inertia * speed * state[DEVIATION] / tables.recovery
+        state[ENGINE_POWER] = min(max(wanted, 0.0), available)
+    else:
+        if state[GOVERNED] != 0.0:
+            state[THROTTLE_OFFSET] = present - throttle_power(tables, lever)
+            state[GOVERNED] = 0.0
+        wanted = min(max(throttle_power(tables, lever) + state[THROTTLE_OFFSET], 0.0), available)
+        state[ENGINE_POWER] = min(present + dt / (tables.lag + dt) * (wanted - present), available)
+    state[DEVIATION] += dt * (state[ENGINE_POWER] - needed) / (tables.inertia * speed)
+    if governed and abs(state[DEVIATION]) < _SAME_SPEED:
+        state[DEVIATION] = 0.0
