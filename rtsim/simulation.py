@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rtsim import simulation_kernels as kernels
-from rtsim.aids import AIDS, AidName
+from rtsim.aids import AIDS, AidName, aid_of
 from rtsim.aircraft.signals import INPUT, STATE
 from rtsim.atmosphere import Gust, Turbulence
 from rtsim.atmosphere.air import add_gust, normals_needed, set_turbulence
@@ -38,6 +38,7 @@ from rtsim.simulation_data import (
     SimulationState,
 )
 from rtsim.simulation_setup import FlightSetup, Parts, build_parts, needed_aid_error, start_state
+from rtsim.systems.drive_kernels import THROTTLE_TRIM
 from rtsim.systems.flap_kernels import FLAP_SETTING
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, to_deg
 
@@ -45,6 +46,8 @@ Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
 SAME_FLAP = deg(0.5)
 """Flaps closer than this to a setting are at it [rad]."""
+MOST_THROTTLE_TRIM = 0.5
+"""Largest throttle trim, as a share of full power."""
 
 __all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
 
@@ -316,8 +319,7 @@ class Simulation:
         Raises:
             InputError: There is no such aid, or the database does not know the aircraft without it.
         """
-        if name not in AIDS:
-            raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(AIDS))
+        aid_of(name)
         if not on and name in self._parts.needed_aids:
             raise needed_aid_error(name)
         self._state.switches[AIDS[name]] = 1.0 if on else 0.0
@@ -355,6 +357,24 @@ class Simulation:
         nodes = self.tables.systems.flaps.nodes
         beyond = nodes[nodes > setting + SAME_FLAP] if step > 0 else nodes[nodes < setting - SAME_FLAP][::-1]
         return float(beyond[0]) if beyond.size else setting
+
+    def set_throttle_trim(self, share: float) -> None:
+        """Trim the throttle from this frame on; it acts while the rotor-speed governor is off.
+
+        Args:
+            share: Engine power to add to that of the power lever, as a share of full power, -0.5 to 0.5.
+
+        Raises:
+            InputError: The share is out of range.
+        """
+        if not -MOST_THROTTLE_TRIM <= share <= MOST_THROTTLE_TRIM:
+            raise InputError(
+                "is out of range",
+                key="throttle trim",
+                value=share,
+                allowed=f"{-MOST_THROTTLE_TRIM:g} to {MOST_THROTTLE_TRIM:g} of full power",
+            )
+        self._state.drive[THROTTLE_TRIM] = share
 
     def set_fault(self, fault: Fault, on: bool) -> None:
         """Let a failure begin or end with this frame.

@@ -110,7 +110,8 @@ class SimulationState(NamedTuple):
     flaps: FloatArray
     """Deflection of the flaps, whether they follow their schedule, and their setting."""
     drive: FloatArray
-    """Rotor speed less the governed one, engine power, its offset from the throttle's law, whether governed."""
+    """Rotor speed less the governed one, engine power, its offset from the throttle's law, whether governed, throttle
+    trim."""
     gusts: FloatArray
     """Turbulence filters, gusts that act or are to come, and what acts now."""
     faults: FloatArray

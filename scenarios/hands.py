@@ -38,12 +38,12 @@ class HandedFlight(Protocol):
         """
         ...
 
-    def switch_aid(self, name: AidName, *, on: bool) -> None:
+    def switch_aid(self, name: str, *, on: bool | None) -> None:
         """Switch a pilot aid.
 
         Args:
             name: The aid.
-            on: On or off.
+            on: On or off; None switches it over.
         """
         ...
 
@@ -52,6 +52,22 @@ class HandedFlight(Protocol):
 
         Args:
             angle: Flap deflection [rad].
+        """
+        ...
+
+    def step_flaps(self, step: int) -> None:
+        """Send the flaps to the next published setting.
+
+        Args:
+            step: 1 down, -1 up.
+        """
+        ...
+
+    def trim_throttle(self, share: float) -> None:
+        """Trim the throttle.
+
+        Args:
+            share: Engine power to add with the governor off, as a share of full power.
         """
         ...
 
@@ -199,15 +215,8 @@ class Hands:
             self._waiting = False
             if request.name != flight.simulation.mode:
                 flight.switch_pilot(request.name)
-        elif kind == "aid" and request.name in AIDS:
-            name: AidName = request.name
-            on = name not in flight.simulation.aids if request.value == 2.0 else request.value == 1.0
-            if on != (name in flight.simulation.aids):
-                flight.switch_aid(name, on=on)
-        elif kind == "flaps":
-            steps = {"up": -1, "down": 1}
-            step = steps.get(request.name)
-            flight.set_flaps(request.value if step is None else flight.simulation.next_flap_setting(step))
+        elif kind in {"aid", "flaps", "throttle"}:
+            _switch(request, flight)
         elif kind == "parameter":
             self._settings = self._settings.with_parameter(request.name, request.value)
             self._handler.change(self._settings)
@@ -231,6 +240,22 @@ class Hands:
             self._known_aids = aids
             self._bits = float(sum(1 << place for place, name in enumerate(AIDS) if name in aids))
         return self._bits
+
+
+def _switch(request: Request, flight: HandedFlight) -> None:
+    """Serve a request for an aid, the flaps or the throttle."""
+    if request.kind == "throttle":
+        flight.trim_throttle(request.value)
+    elif request.kind == "flaps":
+        steps = {"up": -1, "down": 1}
+        if request.name in steps:
+            flight.step_flaps(steps[request.name])
+        else:
+            flight.set_flaps(request.value)
+    elif request.name in AIDS:
+        on = request.name in flight.simulation.aids
+        if request.value == 2.0 or (request.value == 1.0) != on:
+            flight.switch_aid(request.name, on=not on)
 
 
 def pilot_modes(*, plug_in: bool, hands: bool) -> Sequence[PilotMode]:

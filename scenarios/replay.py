@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import AIDS
+from rtsim.aids import aid_of
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256
@@ -19,7 +19,7 @@ from scenarios.flight_setup import setup_from_json, versions
 from telemetry.log_format import LogEvent
 from telemetry.log_reader import FlightLog, read_log
 
-ACTING_KINDS = frozenset({"reset", "pilot", "aid", "flaps", "law", "override"})
+ACTING_KINDS = frozenset({"reset", "pilot", "aid", "flaps", "throttle", "law", "override"})
 """Events besides those of the air and of failures that a replay repeats."""
 
 
@@ -155,12 +155,13 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
         simulation.reset()
         return
     if event.kind == "aid":
-        for aid in AIDS:
-            if aid == event.data["aid"]:
-                simulation.set_aid(aid, bool(event.data["on"]))
+        simulation.set_aid(aid_of(str(event.data["aid"])), bool(event.data["on"]))
         return
     if event.kind == "flaps":
         simulation.set_flaps(float(event.data["angle"]))
+        return
+    if event.kind == "throttle":
+        simulation.set_throttle_trim(float(event.data["share"]))
         return
     if event.kind == "override":
         simulation.set_protection_override(bool(event.data["on"]))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import AidName
+from rtsim.aids import aid_of
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults import fault_events
@@ -226,15 +226,16 @@ class FlightSession:
             return
         self._tell(kind, text, data, level="info" if kind == "turbulence" else "warning")
 
-    def switch_aid(self, name: AidName, *, on: bool) -> None:
-        """Switch a pilot aid from the coming frame on.
+    def switch_aid(self, name: str, *, on: bool | None) -> None:
+        """Switch a pilot aid from the coming frame on; one that cannot be switched is told and changes nothing.
 
         Args:
-            name: The aid.
-            on: On or off.
+            name: One of ``rtsim.aids.AIDS``.
+            on: On or off; None switches it over.
         """
+        on = name not in self.simulation.aids if on is None else on
         try:
-            self.simulation.set_aid(name, on)
+            self.simulation.set_aid(aid_of(name), on)
         except InputError as error:
             self._tell("refused", str(error), level="warning")
             return
@@ -252,6 +253,27 @@ class FlightSession:
             self._tell("refused", str(error), level="warning")
             return
         self._tell("flaps", f"flaps to {to_deg(angle):.0f} deg", {"angle": angle})
+
+    def step_flaps(self, step: int) -> None:
+        """Send the flaps to the next published setting.
+
+        Args:
+            step: 1 down (more flap), -1 up.
+        """
+        self.set_flaps(self.simulation.next_flap_setting(step))
+
+    def trim_throttle(self, share: float) -> None:
+        """Trim the throttle from the coming frame on; what is out of range is told and changes nothing.
+
+        Args:
+            share: Engine power to add with the rotor-speed governor off, as a share of full power.
+        """
+        try:
+            self.simulation.set_throttle_trim(share)
+        except InputError as error:
+            self._tell("refused", str(error), level="warning")
+            return
+        self._tell("throttle", f"throttle trimmed to {100.0 * share:+.0f} % of full power", {"share": share})
 
     def override_protection(self) -> None:
         """Take the authority from the protection law from the coming frame on, or give it back."""

@@ -25,6 +25,7 @@ from rtsim.aids.aids_kernels import (
     TRIM_BIAS,
     AidTables,
 )
+from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.units import deg
@@ -112,3 +113,18 @@ def switches_of(names: tuple[AidName, ...]) -> FloatArray:
     for name in names:
         switches[AIDS[name]] = 1.0
     return switches
+
+
+def aid_of(name: str) -> AidName:
+    """The aid of a name that came from outside.
+
+    Args:
+        name: Any text.
+
+    Raises:
+        InputError: There is no such aid.
+    """
+    for aid in AIDS:
+        if aid == name:
+            return aid
+    raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(AIDS), mend="choose one")

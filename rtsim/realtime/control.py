@@ -24,6 +24,10 @@ Action = Literal[
     "reset",
     "pilot",
     "override",
+    "aid",
+    "flaps",
+    "step-flaps",
+    "throttle",
     "disturb",
     "stop",
 ]
@@ -42,9 +46,11 @@ class Request:
 
     action: Action
     number: float = 0.0
-    """Frames to step, or the new speed."""
+    """Frames to step, the new speed, a flap angle [rad] or step, a throttle trim."""
     text: str = ""
-    """Who shall fly, or why to stop."""
+    """Who shall fly, which aid, or why to stop."""
+    on: bool | None = None
+    """Whether an aid shall be on; None switches it over."""
     change: Disturbance | None = None
     """What shall happen to the air or the aircraft."""
 
@@ -127,6 +133,39 @@ class FlightControl:
     def override_protection(self) -> None:
         """Take the authority from the protection law, which goes on watching, or give it back."""
         self.requests.append(Request("override"))
+
+    def switch_aid(self, name: str, *, on: bool | None = None) -> None:
+        """Switch a pilot aid; one that there is not, or that this flight needs, is refused by an event.
+
+        Args:
+            name: One of ``rtsim.aids.AIDS``.
+            on: On or off; None switches it over.
+        """
+        self.requests.append(Request("aid", text=name, on=on))
+
+    def set_flaps(self, angle: float) -> None:
+        """Send the flaps to a setting; they no longer follow their schedule.
+
+        Args:
+            angle: Flap deflection [rad]; one outside the travel is refused by an event.
+        """
+        self.requests.append(Request("flaps", number=angle))
+
+    def step_flaps(self, step: int) -> None:
+        """Send the flaps to the next published setting.
+
+        Args:
+            step: 1 down (more flap), -1 up.
+        """
+        self.requests.append(Request("step-flaps", number=step))
+
+    def trim_throttle(self, share: float) -> None:
+        """Trim the throttle, which acts while the rotor-speed governor is off.
+
+        Args:
+            share: Engine power to add, as a share of full power; one out of range is refused by an event.
+        """
+        self.requests.append(Request("throttle", number=share))
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend.

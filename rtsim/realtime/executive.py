@@ -94,6 +94,39 @@ class FrameSource(Protocol):
         """Take the authority from the protection law, or give it back."""
         ...
 
+    def switch_aid(self, name: str, *, on: bool | None) -> None:
+        """Switch a pilot aid.
+
+        Args:
+            name: The aid.
+            on: On or off; None switches it over.
+        """
+        ...
+
+    def set_flaps(self, angle: float) -> None:
+        """Send the flaps to a setting.
+
+        Args:
+            angle: Flap deflection [rad].
+        """
+        ...
+
+    def step_flaps(self, step: int) -> None:
+        """Send the flaps to the next published setting.
+
+        Args:
+            step: 1 down, -1 up.
+        """
+        ...
+
+    def trim_throttle(self, share: float) -> None:
+        """Trim the throttle.
+
+        Args:
+            share: Engine power to add with the governor off, as a share of full power.
+        """
+        ...
+
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend.
 
@@ -279,14 +312,28 @@ class Executive:
         elif action == "reset":
             self.source.reset()
             self._reschedule()
-        elif action == "pilot":
-            self.source.switch_pilot(request.text)
-        elif action == "override":
-            self.source.override_protection()
-        elif action == "disturb" and request.change is not None:
-            self.source.disturb(request.change)
         elif action == "stop":
             self._ending, self._stop_reason = "stopped", request.text
+        else:
+            self._pass_on(request)
+
+    def _pass_on(self, request: Request) -> None:
+        """Ask the source for what only it can do."""
+        action, source = request.action, self.source
+        if action == "pilot":
+            source.switch_pilot(request.text)
+        elif action == "override":
+            source.override_protection()
+        elif action == "aid":
+            source.switch_aid(request.text, on=request.on)
+        elif action == "flaps":
+            source.set_flaps(request.number)
+        elif action == "step-flaps":
+            source.step_flaps(int(request.number))
+        elif action == "throttle":
+            source.trim_throttle(request.number)
+        elif action == "disturb" and request.change is not None:
+            source.disturb(request.change)
 
     def _change_speed(self, speed: float) -> None:
         """Go on at another speed; a backlog stays a backlog."""

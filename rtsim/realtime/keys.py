@@ -14,8 +14,18 @@ from typing import Any, Self
 
 from rtsim.realtime.control import FlightControl
 
-KEY_HELP = "space pause, . one frame, + - warp, r reset, p pilot, o override protection, q quit"
-"""One line for the user."""
+KEY_HELP = (
+    "space pause, . one frame, + - warp, r reset, p pilot, o override protection, t rate damping, "
+    "h attitude retention, u automatic flaps, v b flaps down up, g rotor-speed governor, q quit"
+)
+"""What the keys do, for the user."""
+AID_KEYS = {
+    "t": "rate_damping",
+    "h": "attitude_retention",
+    "u": "automatic_flaps",
+    "g": "governor",
+}
+FLAP_KEYS = {"v": 1, "b": -1}
 POLL_S = 0.1
 """How long the reading thread waits at a time [s]; a waiting thread costs the loop nothing."""
 
@@ -41,6 +51,10 @@ def press(control: FlightControl, key: str) -> None:
         control.set_pilot("next")
     elif key == "o":
         control.override_protection()
+    elif key in AID_KEYS:
+        control.switch_aid(AID_KEYS[key])
+    elif key in FLAP_KEYS:
+        control.step_flaps(FLAP_KEYS[key])
     elif key == "q":
         control.stop("stopped by the key q")
 

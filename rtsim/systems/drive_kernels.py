@@ -13,10 +13,11 @@ from typing import NamedTuple
 from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
 
-DEVIATION, ENGINE_POWER, THROTTLE_OFFSET, GOVERNED = 0, 1, 2, 3
+DEVIATION, ENGINE_POWER, THROTTLE_OFFSET, GOVERNED, THROTTLE_TRIM = 0, 1, 2, 3, 4
 """Places in the state: rotor speed less the governed one [rad/s]; shaft power that the engines give, and what it is
-above that of the throttle's law [W]; whether the governor was on in the frame before (0, 1)."""
-DRIVE_STATE_SIZE = 4
+above that of the throttle's law [W]; whether the governor was on in the frame before (0, 1); what the pilot trims the
+throttle by, as a share of full power."""
+DRIVE_STATE_SIZE = 5
 _SAME_SPEED = 1e-6
 """The governor takes a rotor speed this close to the wanted one as reached [rad/s]."""
 
@@ -76,7 +77,7 @@ def drive_advance(
 ) -> None:
     """Turn the rotors over one frame.
 
-    Switching the governor off keeps the engines at the power they give; from there the lever moves it.
+    Switching the governor off keeps the engines at the power they give; from there lever and throttle trim move it.
 
     Args:
         tables: The drive.
@@ -101,7 +102,8 @@ def drive_advance(
         if state[GOVERNED] != 0.0:
             state[THROTTLE_OFFSET] = present - throttle_power(tables, lever)
             state[GOVERNED] = 0.0
-        wanted = min(max(throttle_power(tables, lever) + state[THROTTLE_OFFSET], 0.0), available)
+        trim = state[THROTTLE_TRIM] * tables.power[-1]
+        wanted = min(max(throttle_power(tables, lever) + state[THROTTLE_OFFSET] + trim, 0.0), available)
         state[ENGINE_POWER] = min(present + dt / (tables.lag + dt) * (wanted - present), available)
     state[DEVIATION] += dt * (state[ENGINE_POWER] - needed) / (tables.inertia * speed)
     if governed and abs(state[DEVIATION]) < _SAME_SPEED:

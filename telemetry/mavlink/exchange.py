@@ -33,12 +33,13 @@ class Request(NamedTuple):
     """One discrete thing a ground station asked of the flight."""
 
     kind: str
-    """``reset``, ``pilot``, ``aid``, ``flaps``, ``nacelle``, ``transition``, ``parameter``, ``freeze``."""
+    """``reset``, ``pilot``, ``aid``, ``flaps``, ``throttle``, ``nacelle``, ``transition``, ``parameter`` or
+    ``freeze``."""
     name: str = ""
     """Who shall fly, which aid, which parameter; ``up`` or ``down`` for ``flaps`` to the next setting."""
     value: float = 0.0
-    """On (1), off (0) or toggle (2) for an aid; an angle [rad] for ``nacelle`` and ``flaps``; 3 helicopter or 4
-    airplane for ``transition``; the value of a parameter."""
+    """On (1), off (0) or toggle (2) for an aid; an angle [rad] for ``nacelle`` and ``flaps``; a share of full power for
+    ``throttle``; 3 helicopter or 4 airplane for ``transition``; the value of a parameter."""
 
 
 class Feedback(NamedTuple):

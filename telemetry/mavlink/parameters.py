@@ -38,7 +38,7 @@ class Parameter:
 
 
 RESET, NACELLE_COMMAND, PILOT, ARM_NEUTRAL = "XV_RESET", "XV_NAC_CMD", "XV_PILOT", "XV_ARM_NEUTRAL"
-FLAP_COMMAND = "XV_FLAP_CMD"
+FLAP_COMMAND, THROTTLE_TRIM = "XV_FLAP_CMD", "XV_THR_TRIM"
 LOSS_TIME, OWNER_TIME, LEVER_RANGE, WARNINGS = "XV_MC_LOSS_T", "XV_OWNER_T", "XV_Z_BIPOLAR", "XV_WARN"
 
 AID_PARAMETERS: dict[str, tuple[str, str]] = {
@@ -57,6 +57,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(PILOT, 1, 0, 2, "", "Who flies: 0 virtual pilot, 1 your sticks, 2 held.", choices=True, stored=False),
     Parameter(NACELLE_COMMAND, 90, 0, 90, "deg", "Nacelle angle to go to, 90 helicopter, 0 airplane.", stored=False),
     Parameter(FLAP_COMMAND, 40, 0, 75, "deg", "Flap setting to go to; switches automatic flaps off.", stored=False),
+    Parameter(THROTTLE_TRIM, 0, -50, 50, "%", "Engine power added while the governor is off.", stored=False),
     Parameter("XV_NAC_MODE", 0, 0, 1, "", "Nacelle switch: 0 moves while held, 1 runs to detents.", choices=True),
     Parameter("XV_NAC_RATE", 7.5, 0.5, 7.5, "deg/s", "Nacelle rate of switch and commands."),
     Parameter(LOSS_TIME, 0.5, 0.2, 10, "s", "Sticks count as lost after this time without input."),

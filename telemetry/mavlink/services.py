@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.units import deg
 from telemetry.mavlink.exchange import Request
 from telemetry.mavlink.framing import Frame
-from telemetry.mavlink.parameters import AID_PARAMETERS, FLAP_COMMAND, NACELLE_COMMAND, PILOT, RESET
+from telemetry.mavlink.parameters import AID_PARAMETERS, FLAP_COMMAND, NACELLE_COMMAND, PILOT, RESET, THROTTLE_TRIM
 from telemetry.mavlink.peers import Peer
 from telemetry.mavlink.state import PILOT_EXTERNAL, PILOT_HOLD, PILOT_MOCM
 
@@ -184,6 +184,9 @@ class Services:
             return
         if name == FLAP_COMMAND:
             vehicle.request(Request("flaps", "", deg(value)))
+            return
+        if name == THROTTLE_TRIM:
+            vehicle.request(Request("throttle", "", value / 100.0))
             return
         for aid, (parameter, _) in AID_PARAMETERS.items():
             if parameter == name:

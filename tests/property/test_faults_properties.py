@@ -71,7 +71,7 @@ def test_without_active_failures_everything_passes_untouched(some, rate, airspee
     kernels.fault_update(tables, state, -1.0, x, nacelle, 3.0, airspeed)
     planned = np.zeros(3)
     before = x.tobytes()
-    kernels.fault_actuators_begin(tables, state, AIRCRAFT.controls, x, (0.5, 0.5), 1.0, 1e6, DT, planned)
+    kernels.fault_actuators_begin(tables, state, AIRCRAFT.controls, x, (0.5, 0.5), 1.0, (1e6, True), DT, planned)
     kernels.fault_actuators_end(planned, x)
     assert x.tobytes() == before
     assert kernels.fault_nacelle_rate(state, rate) == rate
@@ -89,7 +89,9 @@ def test_a_failed_actuator_keeps_its_mean_and_stays_between_where_it_was_and_may
     start = x.copy()
     kernels.fault_update(tables, state, fault.start, x, np.array([1.0, 1.0, 0.0]), 3.0, 30.0)
     planned = np.zeros(3)
-    kernels.fault_actuators_begin(tables, state, AIRCRAFT.controls, x, commands, nacelle_angle, power, DT, planned)
+    kernels.fault_actuators_begin(
+        tables, state, AIRCRAFT.controls, x, commands, nacelle_angle, (power, True), DT, planned
+    )
     for channel, position in enumerate((STATE.collective_75, STATE.cyclic_1s, STATE.elevator)):
         if math.isnan(planned[channel]):
             assert x[position] == start[position]

@@ -73,6 +73,9 @@ def frame_of(number, payload, extra, system):
     return b"\xfd" + body + struct.pack("<H", crc)
 
 
+REQUESTS = {"reset", "pilot", "aid", "flaps", "throttle", "nacelle", "transition", "parameter", "freeze"}
+
+
 class Target:
     """A vehicle in flight that counts what it sends."""
 
@@ -114,7 +117,7 @@ class Target:
         assert math.isnan(sticks.nacelle_angle) or 0.0 <= sticks.nacelle_angle <= math.pi / 2 + 1e-9
         for request in self.exchange.take_requests():
             assert math.isfinite(request.value)
-            assert request.kind in {"reset", "pilot", "aid", "nacelle", "transition", "parameter", "freeze"}
+            assert request.kind in REQUESTS
         for parameter, value in (self.vehicle.store.at(place) for place in range(len(self.vehicle.store))):
             assert parameter.low <= value <= parameter.high
         assert self.exchange.header[11] == 0

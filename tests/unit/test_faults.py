@@ -42,6 +42,7 @@ class Flight:
         self.path = np.array([[self.nacelle, 0.0, 0.0]] * 3)
         self.time = 0.0
         self.frame = 0
+        self.governed = True
 
     @property
     def power(self):
@@ -55,7 +56,15 @@ class Flight:
         kernels.fault_update(self.faults, self.state, self.frame * DT, self.x, self.actuator, 3.0, airspeed)
         planned = np.zeros(3)
         kernels.fault_actuators_begin(
-            self.faults, self.state, self.tables.controls, self.x, (stick, lever), self.nacelle, self.power, DT, planned
+            self.faults,
+            self.state,
+            self.tables.controls,
+            self.x,
+            (stick, lever),
+            self.nacelle,
+            (self.power, self.governed),
+            DT,
+            planned,
         )
         nonlinear.step(self.tables, self.x, self.u, self.path, DT, self.work)
         kernels.fault_actuators_end(planned, self.x)
@@ -131,7 +140,7 @@ def test_sound_actuators_are_not_touched(aircraft):
     """Bit for bit the plant's own step, and planned says so."""
     flight = Flight(aircraft, [], airspeed=60.0, nacelle=82.5)
     x, planned = flight.x.copy(), np.zeros(3)
-    arguments = (aircraft.tables.controls, x, (0.3, 0.4), flight.nacelle, 1e6, DT, planned)
+    arguments = (aircraft.tables.controls, x, (0.3, 0.4), flight.nacelle, (1e6, True), DT, planned)
     kernels.fault_actuators_begin(flight.faults, flight.state, *arguments)
     assert np.isnan(planned).all()
     kernels.fault_actuators_end(planned, x)
@@ -166,7 +175,7 @@ def test_begin_is_its_plain_twin(aircraft, mode, channel):
     low = nonlinear.commanded_controls(controls, 0.0, 0.0, flight.nacelle)[0]
     stops = (low, -controls.cyclic_limit, -controls.elevator_limit)
     kernels.fault_actuators_begin(
-        flight.faults, flight.state, controls, flight.x, (-0.4, 0.8), flight.nacelle, 1e6, DT, planned
+        flight.faults, flight.state, controls, flight.x, (-0.4, 0.8), flight.nacelle, (1e6, True), DT, planned
     )
     value = begin if mode == "stuck" else deg(2.0)
     end, start = twin_step(
@@ -244,6 +253,16 @@ def test_the_power_of_one_engine_is_not_exceeded(aircraft):
     assert (powers[round(2.0 / DT) :] < available * 1.005).all()
     assert (powers[round(2.0 / DT) :] > available * 0.97).all()
     assert flight.x[STATE.altitude] < -1.0
+
+
+def test_without_the_governor_nothing_takes_the_collective_back(aircraft):
+    """The governor is what lowers the blades where the power is short; switched off, the pilot has the collective."""
+    flight = Flight(aircraft, [Fault(kind="engine-limit", start=0.0, power=0.0)], airspeed=0.0, nacelle=90.0)
+    flight.governed = False
+    start = flight.x[STATE.collective_75]
+    for _ in range(250):
+        flight.step(flight.u[INPUT.stick], flight.u[INPUT.lever])
+    assert flight.x[STATE.collective_75] == pytest.approx(start, abs=1e-9)
 
 
 def test_power_enough_is_no_failure(aircraft):

@@ -92,7 +92,7 @@ def live(flight, **changes):
 
 
 def test_scenarios_and_parameters_name_the_aids_there_are():
-    assert set(get_args(AidName)) == set(AIDS)
+    assert {*get_args(AidName), "automatic_flaps", "governor"} == set(AIDS)
     assert set(AIDS) <= set(AID_PARAMETERS)
 
 
@@ -133,9 +133,39 @@ def test_aids_are_switched_and_recorded(flight):
         Request("aid", "no_such_aid", 1.0),
     ]
     fly(flight, 1)
-    assert set(flight.simulation.aids) == {"attitude_retention", "trim_bias", "altitude_hold"}
+    assert set(flight.simulation.aids) == {
+        "attitude_retention",
+        "trim_bias",
+        "altitude_hold",
+        "automatic_flaps",
+        "governor",
+    }
     assert [event.data["aid"] for event in flight.events if event.kind == "aid"] == ["rate_damping", "altitude_hold"]
     assert flight.link.reports[-1].aids == sum(1 << list(AIDS).index(name) for name in flight.simulation.aids)
+
+
+def test_flaps_and_governor_by_request(flight):
+    """By angle and by button steps; a setting switches the automatic off; every change is an event for the replay."""
+    live(flight, lever=flight.simulation.pilot_command().lever)
+    fly(flight, 2)
+    flight.link.input.asked = [Request("flaps", "up"), Request("aid", "governor", 2.0), Request("throttle", "", 0.02)]
+    rows = fly(flight, 1500)
+    assert rows[-1, COLUMN.flap_deg] == pytest.approx(20.0)
+    assert set(flight.simulation.aids) == {"rate_damping", "attitude_retention", "trim_bias"}
+    assert rows[-1, COLUMN.rotor_speed_rpm] != pytest.approx(589.0, abs=0.5)
+    flight.link.input.asked = [Request("flaps", "down"), Request("flaps", "down"), Request("flaps", "down")]
+    assert fly(flight, 4000)[-1, COLUMN.flap_deg] == pytest.approx(75.0)
+    flight.link.input.asked = [Request("flaps", "", math.radians(33.0)), Request("aid", "governor", 1.0)]
+    rows = fly(flight, 5000)
+    assert rows[-1, COLUMN.flap_deg] == pytest.approx(33.0)
+    assert rows[-1, COLUMN.rotor_speed_rpm] == pytest.approx(589.0, abs=0.01)
+    flight.link.input.asked = [Request("aid", "automatic_flaps", 2.0), Request("flaps", "", 2.0)]
+    fly(flight, 1)
+    assert "automatic_flaps" in flight.simulation.aids
+    kinds = [event.kind for event in flight.events]
+    assert kinds.count("flaps") == 5
+    assert kinds.count("throttle") == 1
+    assert kinds.count("refused") == 1
 
 
 def test_the_nacelles_go_where_a_request_says(flight):

@@ -87,7 +87,9 @@ def test_linear_model_has_names_and_is_the_derivative(xv15, nonlinear):
     point = xv15.trim(airspeed=airspeed, nacelle=nacelle)
     rng = np.random.default_rng(0)
     for _ in range(5):
-        dx, du = 1e-5 * rng.normal(size=17), 1e-5 * rng.normal(size=7)
+        dx, du = 1e-5 * rng.normal(size=17), 1e-5 * rng.normal(size=11)
+        du[7], du[8] = 0.0, min(du[8], 0.0)  # 40 deg of flap is a corner: the flaps go up, or down from it
+        du[9] = max(du[9], 0.0) if du[8] == 0.0 else 0.0
         change = nonlinear.derivative(point.x + dx, point.u + du, nacelle) - nonlinear.derivative(
             point.x, point.u, nacelle
         )
