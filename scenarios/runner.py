@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from telemetry.rerun_view import RerunView
     from telemetry.view_options import ViewOptions
 
+TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "end"})
+"""Events that ground stations are told of as text."""
 VIEW_PATIENCE_S = 1.5
 """How long the first frame waits for a view that is starting [s]; the flight begins without it after that."""
 
@@ -201,7 +203,7 @@ def _event_listener(outputs: FlightOutputs, link: MavlinkLink | None) -> Callabl
         return heard
 
     def tell(event: LogEvent) -> None:
-        if event.kind in {"pilot", "aid", "end"}:
+        if event.kind in TOLD_TO_STATIONS:
             link.say(event.text, severity=4 if event.level == "warning" else 6)
         if heard is not None:
             heard(event)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -158,6 +158,18 @@ class Services:
         present[PILOT] = float(vehicle.state.pilot)
         for name, value in present.items():
             if vehicle.store[name] != value and now >= self._settling.get(name, 0.0):
+                vehicle.store.set(name, value)
+                vehicle.broadcast(self._value_message(vehicle.store.index[name]))
+
+    def show_commands(self, values: Mapping[str, float]) -> None:
+        """Let parameters that are commands say where the flight stands, as it does at a start.
+
+        Args:
+            values: By name.
+        """
+        vehicle = self._vehicle
+        for name, value in values.items():
+            if vehicle.store[name] != value:
                 vehicle.store.set(name, value)
                 vehicle.broadcast(self._value_message(vehicle.store.index[name]))
 

@@ -34,6 +34,7 @@ from telemetry.mavlink.parameters import (
     FLAP_COMMAND,
     NACELLE_COMMAND,
     OWNER_TIME,
+    THROTTLE_TRIM,
     WARNINGS,
     ParameterStore,
 )
@@ -195,12 +196,18 @@ class Vehicle:
             rows: Full rows, oldest first; may be empty.
             now: Monotonic time [s].
         """
-        first = not self.state.started
+        starts = not self.state.started
         if self.state.observe(rows, now):
             self.board.say(INFO, "Flight reset")
-        if first and self.state.started:
-            self.store.set(NACELLE_COMMAND, min(max(round(self.state.value("nacelle_deg"), 1), 0.0), 90.0))
-            self.store.set(FLAP_COMMAND, min(max(round(self.state.value("flap_deg"), 1), 0.0), 75.0))
+            starts = True
+        if starts and self.state.started:
+            self.services.show_commands(
+                {
+                    NACELLE_COMMAND: min(max(round(self.state.value("nacelle_deg"), 1), 0.0), 90.0),
+                    FLAP_COMMAND: min(max(round(self.state.value("flap_deg"), 1), 0.0), 75.0),
+                    THROTTLE_TRIM: 0.0,
+                }
+            )
 
     def request(self, request: Request) -> None:
         """Ask the flight for something.
