@@ -58,19 +58,6 @@ def programme_at(programme: FloatArray, row: int, time: float) -> float:
 
 
 @inner_kernel
-def scheduled_flap(tables: SimulationTables, state: SimulationState, angle: float) -> float:
-    """Flap deflection of the schedule in the present flight [rad].
-
-    Args:
-        tables: The simulation.
-        state: Its state.
-        angle: Nacelle angle [rad].
-    """
-    u, w = state.x[STATE.u] + state.gusts[G_U], state.x[STATE.w] + state.gusts[G_W]
-    return float(nonlinear.flap_schedule(tables.aircraft.controls, math.sqrt(u**2 + w**2), angle))
-
-
-@inner_kernel
 def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
     """Fill the row with all that is known before the command of this frame; changes no state.
 
@@ -91,7 +78,9 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     state.u[INPUT.gust_u] = gusts[G_U]
     state.u[INPUT.gust_w] = gusts[G_W]
     state.u[INPUT.gust_q] = gusts[G_Q]
-    flap_scheduled = scheduled_flap(tables, state, angle)
+    speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
+    flap_scheduled = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle)
+    scratch.scheduled[0] = flap_scheduled
     flap_inputs(tables.systems.flaps, state.flaps, flap_scheduled, state.u)
     state.u[INPUT.rotor_speed] = state.drive[DEVIATION]
     plant_outputs(tables.aircraft, tables.lpv, x, state.u, angle, (scratch.y, scratch.xdot, scratch.work))

@@ -135,6 +135,8 @@ class Scratch(NamedTuple):
     """Nacelle motion over the frame, shape (3, 3)."""
     motion: FloatArray
     """Nacelle angle, rate, acceleration now."""
+    scheduled: FloatArray
+    """Flap deflection of the schedule [rad], shape (1,)."""
     margins: FloatArray
     """Corridor margins."""
     shown: FloatArray

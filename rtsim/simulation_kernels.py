@@ -25,7 +25,7 @@ from rtsim.faults.fault_kernels import (
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.nacelle.automatic_kernels import automatic_advance
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
-from rtsim.observation_kernels import observe, programme_at, scheduled_flap, sense
+from rtsim.observation_kernels import observe, programme_at, sense
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_engage, mocm_output_in
 from rtsim.plant_kernels import plant_step
 from rtsim.protection import law_data as law
@@ -51,8 +51,9 @@ from rtsim.simulation_data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.systems.drive_kernels import DEVIATION, drive_advance
+from rtsim.systems.drive_kernels import DEVIATION, DriveTables, drive_advance
 from rtsim.systems.flap_kernels import flap_advance
+from rtsim.systems.settings import Systems
 from rtsim.units import DEGREE, KNOT
 
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
@@ -82,7 +83,7 @@ def pilot_command(tables: SimulationTables, state: SimulationState, scratch: Scr
 
 
 @inner_kernel
-def _end_code(tables: SimulationTables, state: SimulationState) -> int:
+def _end_code(drive: DriveTables, wind: float, state: SimulationState) -> int:
     """Whether the flight is over, and how; a landing is judged by sink rate, attitude, speed and rotor clearance."""
     x = state.x
     for i in range(x.shape[0]):
@@ -93,7 +94,7 @@ def _end_code(tables: SimulationTables, state: SimulationState) -> int:
         st, ct = math.sin(pitch), math.cos(pitch)
         sink = x[STATE.w] * ct - x[STATE.u] * st
         state.clock[CLOCK_SINK] = sink
-        ground_speed = x[STATE.u] * ct + x[STATE.w] * st + tables.wind
+        ground_speed = x[STATE.u] * ct + x[STATE.w] * st + wind
         upright = (
             abs(pitch) <= LANDING_PITCH and state.nacelle[1] >= LANDING_NACELLE and abs(ground_speed) <= LANDING_SPEED
         )
@@ -102,7 +103,6 @@ def _end_code(tables: SimulationTables, state: SimulationState) -> int:
         if upright and sink <= HARD_SINK_RATE:
             return END_HARD_LANDING
         return END_CRASH
-    drive = tables.systems.drive
     if not drive.lowest <= drive.governed_speed + state.drive[DEVIATION] <= drive.highest:
         return END_ROTOR_SPEED
     return END_ATTITUDE if abs(pitch) > LARGEST_PITCH else END_NONE
@@ -248,7 +248,7 @@ def complete(
         dt,
         scratch.planned,
     )
-    turn_systems(tables, state, angle, torque, lever)
+    turn_systems(tables.systems, state, scratch.scheduled[0], torque, lever, dt)
     state.clock[CLOCK_FLAGS] = plant_step(tables.aircraft, tables.lpv, x, u, scratch.path, dt, scratch.work)
     fault_actuators_end(scratch.planned, x)
     after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
@@ -265,24 +265,27 @@ def complete(
     state.reference[1] = value_rate
     state.clock[CLOCK_FRAME] += 1.0
     disturb(tables, state, scratch, dt, air_noise)
-    state.clock[CLOCK_END] = _end_code(tables, state)
+    state.clock[CLOCK_END] = _end_code(tables.systems.drive, tables.wind, state)
 
 
 @inner_kernel
-def turn_systems(tables: SimulationTables, state: SimulationState, angle: float, torque: float, lever: float) -> None:
+def turn_systems(
+    systems: Systems, state: SimulationState, scheduled: float, torque: float, lever: float, dt: float
+) -> None:
     """Move flaps and rotor speed to the start of the next frame; the inputs of this one stay as ``observe`` set them.
 
     Args:
-        tables: The simulation.
-        state: Its state at the start of the frame.
-        angle: Nacelle angle [rad].
+        systems: Flaps and rotor drive.
+        state: The simulation's state at the start of the frame.
+        scheduled: Flap deflection of the schedule [rad].
         torque: Torque of both masts together [N m].
         lever: Power lever that acts.
+        dt: Length of the frame [s].
     """
     automatic, governed = state.switches[AUTOMATIC_FLAPS] != 0.0, state.switches[GOVERNOR] != 0.0
-    flap_advance(tables.systems.flaps, state.flaps, automatic, scheduled_flap(tables, state, angle), tables.dt)
-    available = state.faults[F_POWER] if state.faults[F_ENGINE] != 0.0 else tables.systems.drive.power[-1]
-    drive_advance(tables.systems.drive, state.drive, governed, torque, lever, available, tables.dt)
+    flap_advance(systems.flaps, state.flaps, automatic, scheduled, dt)
+    available = state.faults[F_POWER] if state.faults[F_ENGINE] != 0.0 else systems.drive.power[-1]
+    drive_advance(systems.drive, state.drive, governed, torque, lever, available, dt)
 
 
 @inner_kernel

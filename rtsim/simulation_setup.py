@@ -200,6 +200,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         xdot=np.zeros(states),
         path=np.zeros((3, 3)),
         motion=np.zeros(3),
+        scheduled=np.zeros(1),
         margins=np.zeros(MARGIN_COUNT),
         shown=np.zeros(1 + MARGIN_COUNT),
         seen=np.zeros(states),

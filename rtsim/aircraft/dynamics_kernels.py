@@ -49,38 +49,16 @@ def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> f
 
 
 @inner_kernel
-def flap_deflection(tables: AircraftTables, u: FloatArray, airspeed: float, nacelle: float) -> float:
-    """Flap deflection that acts: of the configuration or its schedule, moved by the flap inputs [rad].
+def flap_deflection(scheduled: float, nodes: FloatArray, u: FloatArray) -> float:
+    """Flap deflection that acts: the scheduled one, moved by the flap inputs within the travel [rad].
 
     Args:
-        tables: The aircraft.
+        scheduled: Deflection of the configuration or of the schedule [rad].
+        nodes: Published settings, ascending [rad].
         u: Inputs.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
     """
-    flap = tables.configuration.flap
-    if flap < 0.0:
-        flap = flap_schedule(tables.controls, airspeed, nacelle)
-    flap += u[INPUT.flap_0_20] + u[INPUT.flap_20_40] + u[INPUT.flap_40_75]
-    nodes = tables.wing.flap_nodes
+    flap = scheduled + (u[INPUT.flap_0_20] + u[INPUT.flap_20_40] + u[INPUT.flap_40_75])
     return min(max(flap, nodes[0]), nodes[nodes.shape[0] - 1])
-
-
-@inner_kernel
-def turning(configuration: Configuration, u: FloatArray) -> Configuration:
-    """The configuration with the rotors at their present speed.
-
-    Args:
-        configuration: Mass, air, rotor speed that is held, flap.
-        u: Inputs.
-    """
-    return Configuration(
-        configuration.mass,
-        configuration.density,
-        configuration.sound_speed,
-        configuration.rotor_speed + u[INPUT.rotor_speed],
-        configuration.flap,
-    )
 
 
 @inner_kernel
@@ -135,7 +113,9 @@ def derivative(
         work: Scratch of WORK_COUNT numbers; afterwards holds rotor loads and component loads.
     """
     rotor, mass = tables.rotor, tables.mass
-    air = turning(tables.configuration, u)
+    own = tables.configuration
+    rotor_speed = own.rotor_speed + u[INPUT.rotor_speed]
+    air = Configuration(own.mass, own.density, own.sound_speed, rotor_speed, own.flap)
     nacelle_rate = u[INPUT.nacelle_rate]
     nacelle_acceleration = u[INPUT.nacelle_acceleration]
     ua = x[STATE.u] + u[INPUT.gust_u]
@@ -171,7 +151,10 @@ def derivative(
 
     tip = air.rotor_speed * rotor.radius
     speed = math.sqrt(ua * ua + wa * wa)
-    flap = flap_deflection(tables, u, speed, nacelle)
+    flap = air.flap
+    if flap < 0.0:
+        flap = flap_schedule(tables.controls, speed, nacelle)
+    flap = flap_deflection(flap, tables.wing.flap_nodes, u)
     induced = x[STATE.inflow_0] * tip
     force_coefficient = math.sqrt(thrust * thrust + forward * forward) / (
         air.density * math.pi * rotor.radius**2 * tip * tip

@@ -44,10 +44,12 @@ def _flap_column(aircraft: Xv15, trim: TrimPoint, condition: Condition, interval
     A small step at the trim would mix two intervals: the schedule stands at the corner between them.
     """
     tables, nacelle, u = aircraft.tables, condition.nacelle_angle, trim.u.copy()
-    speed = float(np.hypot(trim.x[STATE.u] + u[INPUT.gust_u], trim.x[STATE.w] + u[INPUT.gust_w]))
+    present = tables.configuration.flap
+    if present < 0.0:
+        speed = float(np.hypot(trim.x[STATE.u] + u[INPUT.gust_u], trim.x[STATE.w] + u[INPUT.gust_w]))
+        present = float(kernels.flap_schedule(tables.controls, speed, nacelle))
     for name in FLAP_INPUTS:
         u[getattr(INPUT, name)] = 0.0
-    present = float(kernels.flap_deflection(tables, u, speed, nacelle))
     ends = []
     for node in tables.wing.flap_nodes[interval : interval + 2]:
         u[INPUT.flap_0_20] = node - present
