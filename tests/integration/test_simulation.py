@@ -160,3 +160,19 @@ def test_setup_is_frozen() -> None:
     """A flight's setup cannot change under it."""
     with pytest.raises(dataclasses.FrozenInstanceError):
         short_conversion().seed = 3  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("outer_loop", ["integrators", "pi"])
+@pytest.mark.parametrize(("airspeed", "nacelle"), [(0.0, 90.0), (60.0, 75.0), (150.0, 0.0)])
+def test_a_climbing_programme_is_followed(airspeed: float, nacelle: float, outer_loop: str) -> None:
+    """40 m up at 2 m/s: the MOCM is told the climb rate ahead and is never more than 3 s of the climb (6 m) off."""
+    programme = Programme(
+        np.array([0.0, 5.0, 25.0, 40.0]),
+        np.full(4, kt(airspeed)),
+        np.full(4, deg(nacelle)),
+        np.array([100.0, 100.0, 140.0, 140.0]),
+    )
+    rows = Simulation(FlightSetup(programme=programme, outer_loop=outer_loop)).run(40 * 250)  # type: ignore[arg-type]
+    error = rows[:, COLUMN.altitude_m] - rows[:, COLUMN.altitude_reference_m]
+    assert np.abs(error).max() < 6.0
+    assert rows[-1, COLUMN.altitude_m] == pytest.approx(140.0, abs=2.5)  # as conversions must hold it
