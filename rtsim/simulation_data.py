@@ -137,6 +137,8 @@ class Scratch(NamedTuple):
     """Nacelle angle, rate, acceleration now."""
     scheduled: FloatArray
     """Flap deflection of the schedule [rad], shape (1,)."""
+    flaps: FloatArray
+    """Flap deflection less what the aids reckon with, in each interval between settings [rad]."""
     margins: FloatArray
     """Corridor margins."""
     shown: FloatArray

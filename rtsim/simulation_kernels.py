@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES, aids_step
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES, SCHEDULE_AIRSPEED, aids_step
+from rtsim.aircraft.dynamics_kernels import flap_schedule
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, gust_step
 from rtsim.compiled import inner_kernel, kernel
@@ -52,7 +53,7 @@ from rtsim.simulation_data import (
     SimulationTables,
 )
 from rtsim.systems.drive_kernels import DEVIATION, DriveTables, drive_advance
-from rtsim.systems.flap_kernels import flap_advance
+from rtsim.systems.flap_kernels import flap_advance, flap_now, flap_parts
 from rtsim.systems.settings import Systems
 from rtsim.units import DEGREE, KNOT
 
@@ -129,7 +130,11 @@ def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, ap
     else:
         acting[0], acting[1] = state.u[INPUT.stick], state.u[INPUT.lever]
         angle, dt = scratch.motion[0], tables.dt
-        aids_step(tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, acting, dt)
+        expected = flap_schedule(tables.aircraft.controls, state.aids[SCHEDULE_AIRSPEED], angle)
+        flap_parts(tables.systems.flaps, flap_now(state.flaps, scratch.scheduled[0]), expected, scratch.flaps)
+        aids_step(
+            tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, scratch.flaps, acting, dt
+        )
     if tables.automatic.active != 0:
         acting[2] = scratch.target[4]
     else:

@@ -201,6 +201,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         path=np.zeros((3, 3)),
         motion=np.zeros(3),
         scheduled=np.zeros(1),
+        flaps=np.zeros(3),
         margins=np.zeros(MARGIN_COUNT),
         shown=np.zeros(1 + MARGIN_COUNT),
         seen=np.zeros(states),

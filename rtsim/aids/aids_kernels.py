@@ -26,7 +26,9 @@ LEVER_REFERENCE, STICK_OFFSET, LEVER_OFFSET, HANDS_LEVER, LEVER_TRIM, LAST_SWITC
 AID_STATE_SIZE = LAST_SWITCHES + AID_COUNT
 # Layers of AidTables.maps.
 MAP_STICK, MAP_PITCH_SENSITIVITY, MAP_PITCH_DAMPING, MAP_LEVER_LIFT, MAP_LEVER_THRUST, MAP_LEVER = 0, 1, 2, 3, 4, 5
-MAP_COUNT = 6
+MAP_STICK_FLAPS = 6
+"""And the two after it: one for each interval between flap settings."""
+MAP_COUNT = 9
 
 CLIMB_PER_HEIGHT = 0.2
 """Climb rate asked for per height error in airplane mode [1/s]."""
@@ -45,7 +47,7 @@ class AidTables(NamedTuple):
     """Nacelle axis [rad]."""
     maps: FloatArray
     """Trim stick, pitch acceleration per stick and pitch rate, climb and forward acceleration per lever, trim
-    lever; (6, V, N)."""
+    lever, stick that answers the moment of the flaps in each interval; (MAP_COUNT, V, N)."""
     schedule_time: float
     """Time constant of the airspeed that schedules the aids [s]."""
     damping: float
@@ -136,7 +138,13 @@ def _path_error(state: FloatArray, x: FloatArray) -> float:
 
 @inner_kernel
 def _terms(
-    tables: AidTables, state: FloatArray, switches: FloatArray, x: FloatArray, nacelle: float, hands: FloatArray
+    tables: AidTables,
+    state: FloatArray,
+    switches: FloatArray,
+    x: FloatArray,
+    nacelle: float,
+    hands: FloatArray,
+    flaps: FloatArray,
 ) -> tuple[float, float, float, float]:
     """Stick and lever with the aids as switched, and the two hold errors (altitude [m], airspeed [m/s])."""
     pitch, q = x[STATE.pitch], x[STATE.q]
@@ -172,6 +180,9 @@ def _terms(
     stick = hands[0]
     if switches[TRIM_BIAS] != 0.0:
         stick += scheduled(tables, MAP_STICK, at, nacelle)
+        for k in range(3):
+            if flaps[k] != 0.0:
+                stick += scheduled(tables, MAP_STICK_FLAPS + k, at, nacelle) * flaps[k]
     attitude = switches[ATTITUDE_RETENTION] + switches[ALTITUDE_HOLD] * (1.0 - share) + switches[AIRSPEED_HOLD] * share
     added = 0.0
     if attitude > 0.0:
@@ -194,6 +205,7 @@ def aids_engage(
     x: FloatArray,
     nacelle: float,
     hands: FloatArray,
+    flaps: FloatArray,
     acting: FloatArray,
 ) -> None:
     """Start or re-start the aids from the present flight so that the acting controls do not step.
@@ -205,6 +217,7 @@ def aids_engage(
         x: Aircraft state.
         nacelle: Nacelle angle [rad].
         hands: Stick and lever as the pilot holds them.
+        flaps: Deflection in each interval between settings less that of the schedule at the aids' airspeed [rad].
         acting: Stick and lever that acted last.
     """
     airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
@@ -217,7 +230,7 @@ def aids_engage(
     state[LEVER_REFERENCE] = acting[1]
     state[HANDS_LEVER] = hands[1]
     state[LEVER_TRIM] = scheduled(tables, MAP_LEVER, airspeed, nacelle)
-    stick, lever, _, _ = _terms(tables, state, switches, x, nacelle, hands)
+    stick, lever, _, _ = _terms(tables, state, switches, x, nacelle, hands, flaps)
     state[STICK_OFFSET] = acting[0] - stick
     state[LEVER_OFFSET] = acting[1] - lever
     for i in range(AID_COUNT):
@@ -232,6 +245,7 @@ def aids_step(
     x: FloatArray,
     nacelle: float,
     hands: FloatArray,
+    flaps: FloatArray,
     acting: FloatArray,
     dt: float,
 ) -> None:
@@ -247,6 +261,7 @@ def aids_step(
         x: Aircraft state.
         nacelle: Nacelle angle [rad].
         hands: Stick and lever as the pilot holds them.
+        flaps: Deflection in each interval between settings less that of the schedule at the aids' airspeed [rad].
         acting: In: stick and lever that acted last; out: those that act now.
         dt: Length of the frame [s].
     """
@@ -254,10 +269,10 @@ def aids_step(
     for i in range(AID_COUNT):
         changed = changed or switches[i] != state[LAST_SWITCHES + i]
     if changed:
-        aids_engage(tables, state, switches, x, nacelle, hands, acting)
+        aids_engage(tables, state, switches, x, nacelle, hands, flaps, acting)
     airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
     state[SCHEDULE_AIRSPEED] += dt / tables.schedule_time * (airspeed - state[SCHEDULE_AIRSPEED])
-    stick, lever, height_error, speed_error = _terms(tables, state, switches, x, nacelle, hands)
+    stick, lever, height_error, speed_error = _terms(tables, state, switches, x, nacelle, hands, flaps)
     stick += state[STICK_OFFSET]
     lever += state[LEVER_OFFSET]
     acting[0] = _limited(stick, 1.0)

@@ -20,11 +20,13 @@ from rtsim.aids.aids_kernels import (
     MAP_PITCH_DAMPING,
     MAP_PITCH_SENSITIVITY,
     MAP_STICK,
+    MAP_STICK_FLAPS,
     RATE_DAMPING,
     SWITCH_COUNT,
     TRIM_BIAS,
     AidTables,
 )
+from rtsim.aircraft.signals import FLAP_INPUTS
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
@@ -74,6 +76,10 @@ def design_aids(database: Database) -> AidTables:
     maps[MAP_PITCH_DAMPING] = reduced_a[..., 2, 2]
     maps[MAP_LEVER_LIFT] = np.sin(pitch) * reduced_b[..., 0, lever] - np.cos(pitch) * reduced_b[..., 1, lever]
     maps[MAP_LEVER_THRUST] = np.cos(pitch) * reduced_b[..., 0, lever] + np.sin(pitch) * reduced_b[..., 1, lever]
+    for k, name in enumerate(FLAP_INPUTS):
+        if name not in inputs:  # a database of one's own: the flaps stay where its schedule has them
+            continue
+        maps[MAP_STICK_FLAPS + k] = -reduced_b[..., 2, inputs.index(name)] / reduced_b[..., 2, stick]
     return AidTables(
         airspeed=database.airspeed,
         nacelle=database.nacelle,

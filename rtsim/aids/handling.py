@@ -61,13 +61,13 @@ def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tu
     x0, acting0 = trim.x.copy(), trim.u[:2].copy()
     hands0 = np.array([0.0 if "attitude_retention" in aids else acting0[0], acting0[1]])
     state0 = np.zeros(AID_STATE_SIZE)
-    aids_engage(tables, state0, switches, x0, nacelle, hands0, acting0)
+    aids_engage(tables, state0, switches, x0, nacelle, hands0, np.zeros(3), acting0)
     path = np.tile([nacelle, 0.0, 0.0], (3, 1))
 
     def frame(z: FloatArray, stick: float) -> FloatArray:
         x, state = z[: x0.size].copy(), np.concatenate([z[x0.size :], switches[:AID_COUNT]])
         acting, u = acting0.copy(), trim.u.copy()
-        aids_step(tables, state, switches, x, nacelle, hands0 + np.array([stick, 0.0]), acting, DT)
+        aids_step(tables, state, switches, x, nacelle, hands0 + np.array([stick, 0.0]), np.zeros(3), acting, DT)
         u[:2] = acting
         lpv_step(lpv, x, u, path, DT, work)
         return np.concatenate([x, state[:LAST_SWITCHES]])

@@ -70,6 +70,22 @@ def flap_advance(tables: FlapTables, state: FloatArray, automatic: bool, schedul
 
 
 @inner_kernel
+def flap_parts(tables: FlapTables, present: float, expected: float, out: FloatArray) -> None:
+    """Split a difference of two deflections into its parts in the intervals between settings.
+
+    Args:
+        tables: The flaps.
+        present: One deflection [rad].
+        expected: The one it is compared with [rad].
+        out: Written: the parts, shape (3,) [rad].
+    """
+    nodes = tables.nodes
+    for k in range(3):
+        low, high = nodes[k], nodes[k + 1]
+        out[k] = min(max(present, low), high) - min(max(expected, low), high)
+
+
+@inner_kernel
 def flap_inputs(tables: FlapTables, state: FloatArray, schedule: float, u: FloatArray) -> None:
     """Write the aircraft's flap inputs: exactly zero while the flaps follow the schedule.
 
@@ -79,8 +95,4 @@ def flap_inputs(tables: FlapTables, state: FloatArray, schedule: float, u: Float
         schedule: Deflection of the schedule [rad].
         u: Inputs of the aircraft; those of the flaps are written.
     """
-    present = flap_now(state, schedule)
-    nodes = tables.nodes
-    for k in range(3):
-        low, high = nodes[k], nodes[k + 1]
-        u[INPUT.flap_0_20 + k] = min(max(present, low), high) - min(max(schedule, low), high)
+    flap_parts(tables, flap_now(state, schedule), schedule, u[INPUT.flap_0_20 : INPUT.flap_40_75 + 1])

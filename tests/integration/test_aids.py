@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rtsim.aids import AIDS
+from rtsim.aids.aids_kernels import MAP_STICK_FLAPS
 from rtsim.aids.handling import handling
 from rtsim.aircraft.signals import STATE
 from rtsim.command import Command, Sensors
@@ -132,6 +133,40 @@ def test_hands_off_the_mocm() -> None:
 def fly_hold(simulation: Simulation, seconds: float, command: Callable[[Sensors], Command]) -> FloatArray:
     """Rows of a flight whose hands look at the sensors."""
     return np.array([simulation.step(command(simulation.sensors())) for _ in range(round(250 * seconds))])
+
+
+@pytest.mark.parametrize("plant", ["lpv", "nonlinear"])
+def test_the_nose_stays_where_it_is_while_the_flaps_come_in(plant: str) -> None:
+    """From 165 kn a little more power takes the aircraft through the retraction at 170 to 180 kn, hands off.
+
+    The flaps' moment alone is 0.7 rad/s^2. Six degrees were chosen as what a hand-flown aircraft may pitch by itself;
+    without the bias's answer to the flaps it was thirty.
+    """
+    simulation = Simulation(setup(165, 0, aids=STABILITY, plant=plant, start_altitude=1000.0))
+    lever, pitch = float(simulation._state.u[1]), np.degrees(float(simulation._state.x[STATE.pitch]))
+    rows = fly_hold(simulation, 30.0, lambda _: Command(0.0, lever + 0.05, 0.0))
+    assert rows[-1, COLUMN.flap_deg] == 0.0
+    assert rows[-1, COLUMN.airspeed_kt] > 178.0
+    np.testing.assert_allclose(rows[:, COLUMN.pitch_deg], pitch, atol=6.0)
+
+
+@pytest.mark.parametrize("plant", ["lpv", "nonlinear"])
+def test_flaps_by_hand_do_not_pitch_the_aircraft(plant: str) -> None:
+    """One setting in at 150 kn, hands off: the nose moves by 3 deg at most; more where the bias ignores the flaps."""
+    moved = {}
+    for answered in (True, False):
+        simulation = Simulation(setup(150, 0, aids=STABILITY, plant=plant, start_altitude=1000.0))
+        if not answered:
+            maps = simulation.tables.aids.maps.copy()
+            maps[MAP_STICK_FLAPS:] = 0.0
+            simulation.tables = simulation.tables._replace(aids=simulation.tables.aids._replace(maps=maps))
+        lever, pitch = float(simulation._state.u[1]), np.degrees(float(simulation._state.x[STATE.pitch]))
+        simulation.step(Command(0.0, lever, 0.0))
+        simulation.set_flaps(deg(20.0))
+        rows = fly_hold(simulation, 8.0, lambda _, lever=lever: Command(0.0, lever, 0.0))  # type: ignore[misc]
+        moved[answered] = np.abs(rows[:, COLUMN.pitch_deg] - pitch).max()
+    assert moved[True] < 3.0
+    assert moved[False] > 1.5 * moved[True]
 
 
 def test_altitude_hold_keeps_the_height_through_a_conversion() -> None:
