@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES, SCHEDULE_AIRSPEED, aids_step
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES, aids_airspeed, aids_step
 from rtsim.aircraft.dynamics_kernels import flap_schedule
 from rtsim.aircraft.signals import INPUT, OUTPUT, STATE
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BUSY, gust_step
@@ -130,7 +130,8 @@ def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, ap
     else:
         acting[0], acting[1] = state.u[INPUT.stick], state.u[INPUT.lever]
         angle, dt = scratch.motion[0], tables.dt
-        expected = flap_schedule(tables.aircraft.controls, state.aids[SCHEDULE_AIRSPEED], angle)
+        airspeed = aids_airspeed(state.aids, state.switches, scratch.seen)
+        expected = flap_schedule(tables.aircraft.controls, airspeed, angle)
         flap_parts(tables.systems.flaps, flap_now(state.flaps, scratch.scheduled[0]), expected, scratch.flaps)
         aids_step(
             tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, scratch.flaps, acting, dt

@@ -137,6 +137,29 @@ def _path_error(state: FloatArray, x: FloatArray) -> float:
 
 
 @inner_kernel
+def _changed(state: FloatArray, switches: FloatArray) -> bool:
+    """Whether a switch was moved since the last frame, or the aids have not begun."""
+    changed = False
+    for i in range(AID_COUNT):
+        changed = changed or switches[i] != state[LAST_SWITCHES + i]
+    return changed
+
+
+@inner_kernel
+def aids_airspeed(state: FloatArray, switches: FloatArray, x: FloatArray) -> float:
+    """Airspeed that schedules the aids in this frame: the present one where they begin anew [m/s].
+
+    Args:
+        state: Their state before ``aids_step``.
+        switches: Which are on.
+        x: Aircraft state.
+    """
+    if _changed(state, switches):
+        return x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
+    return float(state[SCHEDULE_AIRSPEED])
+
+
+@inner_kernel
 def _terms(
     tables: AidTables,
     state: FloatArray,
@@ -265,10 +288,7 @@ def aids_step(
         acting: In: stick and lever that acted last; out: those that act now.
         dt: Length of the frame [s].
     """
-    changed = False
-    for i in range(AID_COUNT):
-        changed = changed or switches[i] != state[LAST_SWITCHES + i]
-    if changed:
+    if _changed(state, switches):
         aids_engage(tables, state, switches, x, nacelle, hands, flaps, acting)
     airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
     state[SCHEDULE_AIRSPEED] += dt / tables.schedule_time * (airspeed - state[SCHEDULE_AIRSPEED])

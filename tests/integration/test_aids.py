@@ -72,9 +72,9 @@ def test_bias_centres_the_stick() -> None:
 
 
 @pytest.mark.parametrize("aid", list(AIDS))
-@pytest.mark.parametrize(("airspeed", "nacelle"), [(0, 90), (80, 75), (130, 25), (170, 0)])
+@pytest.mark.parametrize(("airspeed", "nacelle"), [(0, 90), (80, 75), (130, 25), (170, 0), (200, 0)])
 def test_switching_an_aid_does_not_step_the_controls(aid: str, airspeed: float, nacelle: float) -> None:
-    """On and off in flight: no control moves by more than 1 % of its travel in the frame of the switch (issue 3)."""
+    """On and off in flight: no control moves by more than 1 % of its travel in any frame that follows."""
     simulation = Simulation(setup(airspeed, nacelle))
     stick, lever = (float(v) for v in simulation._state.u[:2])
     before = simulation.step(Command(stick, lever, 0.0))
@@ -82,11 +82,11 @@ def test_switching_an_aid_does_not_step_the_controls(aid: str, airspeed: float, 
         before = simulation.step(Command(stick, lever, 0.0))
     for on in (True, False):
         simulation.set_aid(aid, on)  # type: ignore[arg-type]
-        after = simulation.step(Command(stick, lever, 0.0))
-        assert abs(after[COLUMN.stick] - before[COLUMN.stick]) < 0.02
-        assert abs(after[COLUMN.lever] - before[COLUMN.lever]) < 0.01
         for _ in range(200):
-            before = simulation.step(Command(stick, lever, 0.0))
+            after = simulation.step(Command(stick, lever, 0.0))
+            assert abs(after[COLUMN.stick] - before[COLUMN.stick]) < 0.02
+            assert abs(after[COLUMN.lever] - before[COLUMN.lever]) < 0.01
+            before = after
 
 
 @pytest.mark.parametrize(("airspeed", "nacelle"), [(0, 90), (80, 75), (130, 25), (160, 0)])
