@@ -117,8 +117,13 @@ class Hands:
         requests = self._link.input.requests()
         if requests or self._deferred:
             pending, self._deferred = [*self._deferred, *requests], []
+            resets = False
             for request in pending:
-                self._serve(request, flight)
+                resets = resets or request.kind == "reset"
+                if resets and request.kind not in {"reset", "freeze"}:
+                    self._deferred.append(request)  # the reset comes before the next frame and would undo it
+                else:
+                    self._serve(request, flight)
         sticks, age = self._link.input.read(), self._link.input.age()
         fresh = sticks.sequence > 0 and age <= self._settings.loss_time
         simulation = flight.simulation

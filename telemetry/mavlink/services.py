@@ -51,6 +51,7 @@ class Services:
         """
         self._vehicle = vehicle
         self._settling: dict[str, float] = {}
+        self._set_after_reset: set[str] | None = None
         self.answers: dict[int, Answerer] = {
             4: self.ping,
             20: self.read_parameter,
@@ -164,14 +165,21 @@ class Services:
     def show_commands(self, values: Mapping[str, float]) -> None:
         """Let parameters that are commands say where the flight stands, as it does at a start.
 
+        Those set since a station asked for the reset stay: they act after it.
+
         Args:
             values: By name.
         """
         vehicle = self._vehicle
+        kept, self._set_after_reset = self._set_after_reset or set(), None
         for name, value in values.items():
-            if vehicle.store[name] != value:
+            if name not in kept and vehicle.store[name] != value:
                 vehicle.store.set(name, value)
                 vehicle.broadcast(self._value_message(vehicle.store.index[name]))
+
+    def expect_reset(self) -> None:
+        """The flight was asked to start again: what is set from now on acts after that."""
+        self._set_after_reset = set()
 
     def hand_over(self, name: str, now: float) -> None:
         """Pass a changed parameter on to the flight.
@@ -188,6 +196,8 @@ class Services:
                 vehicle.request(Request("reset"))
             vehicle.store.set(RESET, 0.0)
             return
+        if self._set_after_reset is not None:
+            self._set_after_reset.add(name)
         if name == PILOT:
             vehicle.request(Request("pilot", _PILOT_NAMES[int(value)]))
             return

@@ -215,6 +215,8 @@ class Vehicle:
         Args:
             request: What.
         """
+        if request.kind == "reset":
+            self.services.expect_reset()
         if not self.exchange.put_request(request):
             self.board.say_seldom("queue", WARNING, "The flight does not listen", self.now)
 

@@ -216,6 +216,20 @@ def test_reset_and_freeze_go_to_the_executive_also_while_it_stands(flight):
     assert fly(flight, 1)[0, COLUMN.pilot_mode] == 2.0
 
 
+def test_what_is_asked_for_after_a_reset_acts_after_it(flight):
+    flight.link.input.asked = [
+        Request("reset"),
+        Request("flaps", "", math.radians(20.0)),
+        Request("throttle", "", 0.02),
+    ]
+    fly(flight, 1)
+    assert [request.action for request in flight.control.requests] == ["reset"]
+    assert "automatic_flaps" in flight.simulation.aids
+    flight.session.reset()
+    assert fly(flight, 51)[-1, COLUMN.flap_deg] == pytest.approx(39.0)
+    assert [event.kind for event in flight.events] == ["reset", "flaps", "throttle"]
+
+
 def test_after_a_reset_the_hands_wait_again(flight):
     live(flight)
     fly(flight, 20)

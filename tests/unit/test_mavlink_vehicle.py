@@ -513,6 +513,21 @@ def test_a_changed_parameter_is_told_to_everybody(bench):
     assert [message.param_value for message in bench.taken("PARAM_VALUE", OTHER)] == [5.0]
 
 
+def test_commands_set_after_a_reset_was_asked_for_are_not_put_back_by_it(bench):
+    """Set before it, they say where the flight starts; set after it, they act, whenever the reset is seen."""
+    bench.signals["flap_deg"] = 40.0
+    bench.fly(0.1)
+    store = bench.vehicle.store
+    for name, value in (("XV_FLAP_CMD", 75.0), ("XV_THR_TRIM", 5.0), ("XV_RESET", 1.0), ("XV_THR_TRIM", 2.0)):
+        bench.send(dialect.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+    bench.time_s, bench.frame = 0.0, 0
+    bench.fly(0.1)
+    assert (store["XV_FLAP_CMD"], store["XV_THR_TRIM"]) == (40.0, 2.0)
+    bench.time_s, bench.frame = 0.0, 0  # by a key of the flight's own terminal
+    bench.fly(0.1)
+    assert store["XV_THR_TRIM"] == 0.0
+
+
 def test_reset_nacelle_pilot_and_aids_are_parameters(bench):
     assert set_parameter(bench, "XV_RESET", 1.0) == [0.0]
     assert set_parameter(bench, "XV_NAC_CMD", 75.0) == [75.0]
