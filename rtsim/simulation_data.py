@@ -35,7 +35,7 @@ REFERENCE_AIRSPEED, REFERENCE_RATE = 0, 1
 REFERENCE_SIZE = 2
 # Why a flight ended by itself.
 END_NONE, END_CRASH, END_ATTITUDE, END_NOT_FINITE, END_GENTLE_LANDING, END_HARD_LANDING = 0, 1, 2, 3, 4, 5
-END_ROTOR_SPEED = 6
+END_ROTORS_SLOW, END_ROTORS_FAST = 6, 7
 END_REASONS = {
     END_NONE: "",
     END_CRASH: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
@@ -43,7 +43,8 @@ END_REASONS = {
     END_NOT_FINITE: "the model diverged: a state is no longer a finite number",
     END_GENTLE_LANDING: "touched down gently, sinking at {sink:.1f} m/s",
     END_HARD_LANDING: "landed hard, sinking at {sink:.1f} m/s",
-    END_ROTOR_SPEED: "the rotors turned too slow or too fast without their governor (80 to 115 % can be flown)",
+    END_ROTORS_SLOW: "rotor speed below 80 %: slower than can be flown",
+    END_ROTORS_FAST: "rotor speed above 115 %: faster than can be flown",
 }
 """Why a flight ended by itself, by the code in the simulation's clock."""
 # The array handed to the pilot, see rtsim.pilot.pilot_kernels.

@@ -45,7 +45,8 @@ from rtsim.simulation_data import (
     END_HARD_LANDING,
     END_NONE,
     END_NOT_FINITE,
-    END_ROTOR_SPEED,
+    END_ROTORS_FAST,
+    END_ROTORS_SLOW,
     MODE_EXTERNAL,
     MODE_MOCM,
     Scratch,
@@ -104,8 +105,11 @@ def _end_code(drive: DriveTables, wind: float, state: SimulationState) -> int:
         if upright and sink <= HARD_SINK_RATE:
             return END_HARD_LANDING
         return END_CRASH
-    if not drive.lowest <= drive.governed_speed + state.drive[DEVIATION] <= drive.highest:
-        return END_ROTOR_SPEED
+    rotor_speed = drive.governed_speed + state.drive[DEVIATION]
+    if rotor_speed > drive.highest:
+        return END_ROTORS_FAST
+    if not rotor_speed >= drive.lowest:
+        return END_ROTORS_SLOW
     return END_ATTITUDE if abs(pitch) > LARGEST_PITCH else END_NONE
 
 

@@ -26,6 +26,7 @@ from scenarios.loader import load_scenario
 from scenarios.options import Overrides
 from scenarios.replay import replay_log
 from scenarios.runner import FlightOutputs
+from telemetry.mavlink.notices import TEXT_LENGTH
 
 PLANTS = ["lpv", "lpv-plain", "nonlinear"]
 
@@ -100,9 +101,22 @@ def test_an_engine_fails_without_the_governor(plant: str) -> None:
         late = rows[rows[:, COLUMN.time_s] > 2.5]
         assert np.all(late[:, COLUMN.engine_power_shp] < 1802.0 * 1.01)
         slowest[governor] = rows[:, COLUMN.rotor_speed_rpm].min()
-        assert ("rotors turned too slow" in simulation.end_reason) == (not governor)
+        assert simulation.end_reason.startswith("rotor speed below 80 %") == (not governor)
     assert slowest[True] == pytest.approx(589.0, abs=1e-9)
     assert slowest[False] < 480.0
+
+
+def test_the_end_says_which_way_the_rotor_speed_left_and_fits_a_statustext() -> None:
+    ends = {}
+    for trim in (-0.5, 0.5):
+        simulation = Simulation(hold(0, 90, governor=False, altitude=1000.0))
+        simulation.set_throttle_trim(trim)
+        simulation.run(10 * 250)
+        ends[trim] = simulation.end_reason
+        assert len(simulation.end_reason) <= TEXT_LENGTH
+    drive = simulation.tables.systems.drive
+    assert ends[-0.5].startswith(f"rotor speed below {100.0 * drive.lowest / drive.governed_speed:.0f} %")
+    assert ends[0.5].startswith(f"rotor speed above {100.0 * drive.highest / drive.governed_speed:.0f} %")
 
 
 def test_the_rotor_answers_lever_and_throttle_trim_the_right_way() -> None:
