@@ -66,6 +66,8 @@ class LimitWatch:
         self._acted = 0  # last frame in which it did
         self._episodes = 0
         self._active_frames = [0, 0, 0]
+        none = np.zeros((0, SIGNAL_COUNT))  # compiled or loaded now: the first rows come while the flight is on its way
+        self._look(none)
 
     def row(self, row: FloatArray) -> None:
         """Take one row of a paced flight.
@@ -127,12 +129,17 @@ class LimitWatch:
         self._reasons = [{0}, {0}, {0}]
         self._began = None
 
-    def _watch_limits(self, rows: FloatArray) -> None:
+    def _look(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Margins and levels of rows, each of shape (frames, KIND_COUNT)."""
         frames = len(rows)
         margins, levels = np.empty((frames, KIND_COUNT)), np.empty((frames, KIND_COUNT))
         sensors = sensors_of_rows(rows)
         ahead = np.ascontiguousarray(rows[:, COLUMN.time_to_limit_s])
         watch(self._tables, sensors, ahead, self._dt, self._levels, margins, levels)
+        return margins, levels
+
+    def _watch_limits(self, rows: FloatArray) -> None:
+        margins, levels = self._look(rows)
         np.minimum(self._worst, margins.min(axis=0), out=self._worst)
         self._outside_frames += np.count_nonzero(margins < self._outside, axis=0)
         told = np.where(levels >= TOLD_FROM, levels, 0.0)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import itertools
 import re
+import subprocess
+import sys
 from collections import deque
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from scenarios.limit_watch import LimitWatch
 from scenarios.options import Overrides
 from scenarios.replay import replay_log
 from scenarios.runner import FlightOutputs
+from telemetry.child_process import child_environment
 
 LAWS = """
 import time
@@ -203,3 +206,12 @@ def test_the_law_of_the_documentation_flies(tmp_path: Path, monkeypatch: pytest.
     assert told(flight, "law") == []
     assert "nacelles protected: low-speed side of the corridor" in {event.text for event in flight.events}
     assert flight["nacelle_deg"].min() > bare["nacelle_deg"].min() + 10.0
+
+
+def test_the_limit_watch_compiles_nothing_once_rows_come() -> None:
+    """Its kernels are ready before the flight begins, also the first time they are ever used."""
+    fresh = "from scenarios.limit_watch import LimitWatch, watch; import numpy as np; "
+    fresh += "from rtsim.frame import SIGNAL_COUNT; w = LimitWatch('design', print, dt=0.004); "
+    fresh += "before = list(watch.signatures); w.rows(np.zeros((10, SIGNAL_COUNT))); "
+    fresh += "assert before and list(watch.signatures) == before"
+    subprocess.run([sys.executable, "-c", fresh], env=child_environment(), check=True)
