@@ -345,15 +345,19 @@ class Simulation:
         self.set_aid("automatic_flaps", on=False)
         self._state.flaps[FLAP_SETTING] = angle
 
+    @property
+    def flap_setting(self) -> float:
+        """Deflection that the flaps go to or stand at [rad]."""
+        setting = float(self._state.flaps[FLAP_SETTING])
+        return setting if setting >= 0.0 else deg(float(self._observe()[COLUMN.flap_deg]))
+
     def next_flap_setting(self, step: int) -> float:
         """The published flap setting beyond the present one [rad]; the last one stays.
 
         Args:
             step: 1 down (more flap), -1 up.
         """
-        setting = float(self._state.flaps[FLAP_SETTING])
-        if setting < 0.0:
-            setting = deg(float(self._observe()[COLUMN.flap_deg]))
+        setting = self.flap_setting
         nodes = self.tables.systems.flaps.nodes
         beyond = nodes[nodes > setting + SAME_FLAP] if step > 0 else nodes[nodes < setting - SAME_FLAP][::-1]
         return float(beyond[0]) if beyond.size else setting

@@ -176,6 +176,7 @@ class Hands:
             if request.kind == "freeze":
                 self._control.toggle_pause()
             elif request.kind == "reset":
+                self._deferred.clear()  # asked for before it
                 self._control.reset()
             else:
                 self._deferred.append(request)

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from telemetry.rerun_view import RerunView
     from telemetry.view_options import ViewOptions
 
-TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "end"})
+TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "advice", "end"})
 """Events that ground stations are told of as text."""
 VIEW_PATIENCE_S = 1.5
 """How long the first frame waits for a view that is starting [s]; the flight begins without it after that."""

@@ -206,6 +206,9 @@ class FlightSession:
                 by_hand = mode == "external" and self._hands is not None
                 self._tell("pilot", HAND_WORDS if by_hand else PILOT_WORDS[mode], {"mode": mode})
                 self.simulation.set_pilot(mode)
+                if mode == "mocm" and "governor" not in self.simulation.aids:
+                    text = "the virtual pilot reckons with a governed rotor, and the governor is off"
+                    self._tell("advice", text, level="warning")
                 if by_hand and self._hands is not None:
                     self._hands.engage()
                 return
@@ -260,7 +263,9 @@ class FlightSession:
         Args:
             step: 1 down (more flap), -1 up.
         """
-        self.set_flaps(self.simulation.next_flap_setting(step))
+        present, wanted = self.simulation.flap_setting, self.simulation.next_flap_setting(step)
+        if wanted != present:  # at the end of the travel there is nothing to say
+            self.set_flaps(wanted)
 
     def trim_throttle(self, share: float) -> None:
         """Trim the throttle from the coming frame on; what is out of range is told and changes nothing.

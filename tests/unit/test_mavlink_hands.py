@@ -163,9 +163,28 @@ def test_flaps_and_governor_by_request(flight):
     fly(flight, 1)
     assert "automatic_flaps" in flight.simulation.aids
     kinds = [event.kind for event in flight.events]
-    assert kinds.count("flaps") == 5
+    assert kinds.count("flaps") == 4  # 20, 40, 75, 33; the third step down is beyond the end
     assert kinds.count("throttle") == 1
     assert kinds.count("refused") == 1
+
+
+def test_handing_over_without_the_governor_is_advised_against(flight):
+    flight.session.switch_pilot("external")
+    flight.session.switch_pilot("mocm")
+    assert "advice" not in {event.kind for event in flight.events}
+    flight.simulation.set_aid("governor", False)
+    flight.session.switch_pilot("mocm")
+    assert flight.events[-1].kind == "advice"
+    assert flight.events[-1].level == "warning"
+
+
+def test_a_reset_while_paused_forgets_what_was_asked_before(flight):
+    for request in (Request("flaps", "up"), Request("reset"), Request("aid", "governor", 0.0)):
+        flight.link.input.asked = [request]
+        flight.control.poll()
+    rows = fly(flight, 50)
+    assert rows[-1, COLUMN.flap_deg] == 40.0
+    assert "governor" not in flight.simulation.aids
 
 
 def test_the_nacelles_go_where_a_request_says(flight):
