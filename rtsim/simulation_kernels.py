@@ -53,7 +53,7 @@ from rtsim.simulation_data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.systems.drive_kernels import DEVIATION, DriveTables, drive_advance
+from rtsim.systems.drive_kernels import DEVIATION, DriveTables, drive_advance, governor_power
 from rtsim.systems.flap_kernels import flap_advance, flap_now, flap_parts
 from rtsim.systems.settings import Systems
 from rtsim.units import DEGREE, KNOT
@@ -247,6 +247,8 @@ def complete(
     governed = state.switches[GOVERNOR] != 0.0
     torque = 2.0 * scratch.y[OUTPUT.torque]
     power = torque * (tables.systems.drive.governed_speed + state.drive[DEVIATION])
+    # Where an engine fails, collective is taken off until the power suffices to bring the rotors back too.
+    power = governor_power(tables.systems.drive, state.drive, power)
     fault_actuators_begin(
         tables.faults,
         state.faults,

@@ -279,7 +279,7 @@ def fault_actuators_begin(
         x: Aircraft state at the start of the step; failed actuators are changed.
         commands: Stick and lever of the step.
         nacelle_angle: Nacelle angle in the middle of the step [rad].
-        drive: Shaft power of both rotors now [W], and whether the rotor-speed governor is on.
+        drive: Shaft power that the rotor-speed governor asks for [W], and whether it is on.
         dt: Length of the step [s].
         planned: Written: angles of the actuators after the step; NaN where the plant's own are right, shape (3,).
     """

@@ -72,12 +72,27 @@ def engine_power(state: FloatArray, needed: float) -> float:
 
 
 @inner_kernel
+def governor_power(tables: DriveTables, state: FloatArray, needed: float) -> float:
+    """Shaft power with which the governor would hold the rotor speed, or bring it back [W].
+
+    Args:
+        tables: The drive.
+        state: Drive state.
+        needed: Shaft power that the rotors take [W].
+    """
+    speed = tables.governed_speed + state[DEVIATION]
+    return float(needed - tables.inertia * speed * state[DEVIATION] / tables.recovery)
+
+
+@inner_kernel
 def drive_advance(
     tables: DriveTables, state: FloatArray, governed: bool, torque: float, lever: float, available: float, dt: float
 ) -> None:
     """Turn the rotors over one frame.
 
     Switching the governor off keeps the engines at the power they give; from there lever and throttle trim move it.
+    Switched on again, it brings the rotors back with what the engines can give or take, and holds them where that does
+    not suffice.
 
     Args:
         tables: The drive.
@@ -96,8 +111,9 @@ def drive_advance(
         if state[DEVIATION] == 0.0:
             state[ENGINE_POWER] = needed
             return
-        wanted = needed - tables.inertia * speed * state[DEVIATION] / tables.recovery
-        state[ENGINE_POWER] = min(max(wanted, 0.0), available)
+        # Limits slow the recovery down, but never undo it: a governed rotor runs away no more off its speed than on it.
+        wanted = governor_power(tables, state, needed)
+        state[ENGINE_POWER] = min(max(wanted, min(needed, 0.0)), max(needed, available))
     else:
         if state[GOVERNED] != 0.0:
             state[THROTTLE_OFFSET] = present - throttle_power(tables, lever)

@@ -119,6 +119,35 @@ def test_the_end_says_which_way_the_rotor_speed_left_and_fits_a_statustext() -> 
     assert ends[0.5].startswith(f"rotor speed above {100.0 * drive.highest / drive.governed_speed:.0f} %")
 
 
+@pytest.mark.parametrize("plant", ["lpv", "nonlinear"])
+def test_a_governor_back_on_takes_collective_to_bring_the_rotors_back(plant: str) -> None:
+    """One engine, too much lever: without the governor the rotors slow down, with it again they come back to speed."""
+    fault = Fault(kind="engine-limit", start=0.0, power=0.0, other_engine="normal")
+    simulation = Simulation(hold(60, 75, plant=plant, faults=(fault,), governor=False, pilot="external"))
+    start = simulation.pilot_command()
+    command = Command(start.stick, start.lever + 0.15, 0.0)
+    rows = [simulation.step(command) for _ in range(4 * 250)]
+    assert rows[-1][COLUMN.rotor_speed_rpm] < 560.0
+    low = rows[-1][COLUMN.collective_75_deg]
+    simulation.set_aid("governor", True)
+    rows = [simulation.step(command) for _ in range(6 * 250)]
+    assert rows[-1][COLUMN.rotor_speed_rpm] > 587.0
+    assert rows[-1][COLUMN.collective_75_deg] < low
+
+
+def test_a_governor_back_on_holds_windmilling_rotors() -> None:
+    """In airplane mode with the lever back: off its speed a governed rotor runs away no more than on it."""
+    simulation = Simulation(hold(180, 0, plant="nonlinear", pilot="external", governor=False))
+    start = simulation.pilot_command()
+    for frame in range(3 * 250):
+        if frame == 25:
+            simulation.set_aid("governor", True)
+        row = simulation.step(Command(start.stick, start.lever - 0.5 * min(frame / 250.0, 1.0), 0.0))
+    assert not simulation.finished
+    assert row[COLUMN.engine_power_shp] < 0.0
+    assert row[COLUMN.rotor_speed_rpm] < 592.0
+
+
 def test_the_rotor_answers_lever_and_throttle_trim_the_right_way() -> None:
     """More collective than the throttle brings power slows the rotors; a throttle trim alone speeds them up."""
     change = {}

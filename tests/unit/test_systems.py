@@ -160,12 +160,26 @@ def test_the_throttle_trim_adds_its_share_while_the_governor_is_off():
     on=st.booleans(),
 )
 def test_engine_power_stays_between_none_and_what_there_is(deviation, torque, lever, available, on):
+    """The governor alone goes beyond: as far as a rotor on its speed makes it go."""
     state = governed(deviation)
     state[drive.GOVERNED] = 0.0
     for _ in range(20):
+        needed = torque * (DRIVE.governed_speed + state[drive.DEVIATION])
         drive.drive_advance(DRIVE, state, on, torque, lever, available, DT)
+        low, high = (min(0.0, needed), max(needed, available)) if on else (0.0, available)
         if state[drive.DEVIATION] != 0.0:
-            assert 0.0 <= state[drive.ENGINE_POWER] <= available
+            assert low <= state[drive.ENGINE_POWER] <= high
+
+
+@given(deviation=st.floats(-12.0, 9.0), torque=st.floats(-6e4, 8e4), available=st.floats(0.0, FULL))
+def test_a_governed_rotor_never_moves_away_from_its_speed(deviation, torque, available):
+    """Windmilling, or short of power, it may not come back; but it does not run away, as it does not from rest."""
+    state = governed(deviation)
+    state[drive.GOVERNED] = 0.0
+    for _ in range(20):
+        before = abs(state[drive.DEVIATION])
+        drive.drive_advance(DRIVE, state, True, torque, 0.5, available, DT)
+        assert abs(state[drive.DEVIATION]) <= before
 
 
 @pytest.mark.parametrize("deviation", [-5.0, 4.0])
