@@ -352,7 +352,7 @@ class Simulation:
         return setting if setting >= 0.0 else deg(float(self._observe()[COLUMN.flap_deg]))
 
     def next_flap_setting(self, step: int) -> float:
-        """The published flap setting beyond the present one [rad]; the last one stays.
+        """The published flap setting beyond the present one [rad]; beyond the last one, that one.
 
         Args:
             step: 1 down (more flap), -1 up.
@@ -360,7 +360,7 @@ class Simulation:
         setting = self.flap_setting
         nodes = self.tables.systems.flaps.nodes
         beyond = nodes[nodes > setting + SAME_FLAP] if step > 0 else nodes[nodes < setting - SAME_FLAP][::-1]
-        return float(beyond[0]) if beyond.size else setting
+        return float(beyond[0] if beyond.size else nodes[-1 if step > 0 else 0])
 
     def set_throttle_trim(self, share: float) -> None:
         """Trim the throttle from this frame on; it acts while the rotor-speed governor is off.

@@ -233,6 +233,18 @@ def test_a_database_with_other_variables_cannot_be_flown(tmp_path: Path) -> None
         Simulation(hold(60, 75, database=str(file)))
 
 
+def test_the_flap_switch_goes_from_setting_to_setting_and_to_the_ends() -> None:
+    simulation = Simulation(hold(0, 90))
+    assert [simulation.next_flap_setting(step) for step in (1, -1)] == [deg(75.0), deg(20.0)]
+    simulation.set_flaps(deg(75.0))
+    simulation.run(8 * 250)
+    simulation.set_aid("automatic_flaps", True)
+    simulation.run(3)
+    assert simulation.next_flap_setting(1) == deg(75.0)  # on their way back, hardly off the end
+    simulation.set_flaps(deg(0.2))
+    assert simulation.next_flap_setting(-1) == 0.0
+
+
 def test_settings_out_of_range_are_refused() -> None:
     simulation = Simulation(hold(0, 90))
     with pytest.raises(InputError, match="outside the travel of the flaps"):
