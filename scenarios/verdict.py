@@ -252,6 +252,8 @@ def plan_of(scenario: Scenario) -> FlightPlan:
         wind=scenario.wind,
         pilot_noise=scenario.pilot_noise,
         outer_loop=scenario.outer_loop,
+        automatic_flaps=scenario.automatic_flaps,
+        governor=scenario.governor,
         seed=scenario.seed,
     )
 

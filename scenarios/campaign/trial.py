@@ -73,6 +73,10 @@ class FlightPlan:
     """Noise of the built-in pilot."""
     outer_loop: Literal["integrators", "pi"] = "integrators"
     """How the built-in pilot holds airspeed and altitude."""
+    automatic_flaps: bool = True
+    """Whether the flaps follow their schedule."""
+    governor: bool = True
+    """Whether the governor holds the rotor speed."""
     seed: int = 0
     """Root of the flight's random streams."""
 
@@ -233,6 +237,8 @@ class Bench:
             wind=plan.wind,
             seed=plan.seed,
             pilot_noise=plan.pilot_noise,
+            automatic_flaps=plan.automatic_flaps,
+            governor=plan.governor,
             air=plan.air,
             faults=plan.faults,
         )

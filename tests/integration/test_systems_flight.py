@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,12 @@ from rtsim.realtime import FlightControl
 from rtsim.realtime.keys import press
 from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt
+from scenarios.campaign.trial import Bench
 from scenarios.loader import load_scenario
 from scenarios.options import Overrides
 from scenarios.replay import replay_log
 from scenarios.runner import FlightOutputs
+from scenarios.verdict import plan_of
 from telemetry.mavlink.notices import TEXT_LENGTH
 
 PLANTS = ["lpv", "lpv-plain", "nonlinear"]
@@ -198,9 +201,26 @@ def test_a_scenario_starts_without_them(tmp_path: Path) -> None:
     assert scenarios.fly(tmp_path / "own.toml", speed="max").completed
 
 
-def without_inputs(database: Database, names: tuple[str, ...]) -> Database:
-    from dataclasses import replace
+@pytest.mark.parametrize("on", [True, False])
+def test_a_trial_flies_with_the_flaps_and_rotors_of_its_scenario(tmp_path: Path, on: bool) -> None:
+    """A test of protection is flown on a bench; here from 170 to 185 kn, where the schedule takes the flaps in."""
+    switches = f"[flight]\nautomatic_flaps = {str(on).lower()}\ngovernor = {str(on).lower()}\n\n[start]\n"
+    text = load_scenario("ep07_deceleration_airplane").source.replace("[start]\n", switches, 1)
+    for old, new in (
+        ("_deg = 5\n", "_deg = 0\n"),
+        ("_deg = 5,", "_deg = 0,"),
+        ("_kt = 150", "_kt = 170"),
+        ("85", "185"),
+    ):
+        text = text.replace(old, new)
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    plan = replace(plan_of(load_scenario(tmp_path / "own.toml")), duration=6.0)
+    rows = Bench().fly(plan, "off", keep=True).rows
+    assert (np.ptp(rows[:, COLUMN.flap_deg]) == 0.0) == (not on)
+    assert (np.ptp(rows[:, COLUMN.rotor_speed_rpm]) == 0.0) == on
 
+
+def without_inputs(database: Database, names: tuple[str, ...]) -> Database:
     keep = [i for i, variable in enumerate(database.inputs) if variable.name not in names]
     return replace(
         database,
