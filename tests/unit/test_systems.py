@@ -69,6 +69,11 @@ def test_flaps_stay_where_they_are_when_the_schedule_is_left():
     flap.flap_advance(FLAPS, state, False, deg(33.0), DT)
     flap.flap_advance(FLAPS, state, False, deg(10.0), DT)
     assert flap.flap_now(state, deg(10.0)) == deg(33.0)
+    # A setting of before the schedule was followed is forgotten: left again, they stay where they are then.
+    state[flap.FLAP_SETTING] = deg(60.0)
+    flap.flap_advance(FLAPS, state, True, deg(33.0), DT)
+    flap.flap_advance(FLAPS, state, False, deg(33.0), DT)
+    assert flap.flap_now(state, deg(10.0)) == deg(33.0)
 
 
 @pytest.mark.parametrize("setting", [0.0, 20.0, 75.0])
@@ -180,6 +185,22 @@ def test_a_governed_rotor_never_moves_away_from_its_speed(deviation, torque, ava
         before = abs(state[drive.DEVIATION])
         drive.drive_advance(DRIVE, state, True, torque, 0.5, available, DT)
         assert abs(state[drive.DEVIATION]) <= before
+
+
+def test_an_engine_that_fails_gives_at_once_no_more_than_it_can():
+    state = governed()
+    drive.drive_advance(DRIVE, state, True, 2e4, 0.5, FULL, DT)
+    drive.drive_advance(DRIVE, state, False, 2e4, 0.5, 3e5, DT)
+    assert state[drive.ENGINE_POWER] == 3e5
+    # Switched back on, it gives what the governor asks for, not what the rotors take.
+    drive.drive_advance(DRIVE, state, True, 2e4, 0.5, FULL, DT)
+    assert state[drive.DEVIATION] != 0.0
+    assert drive.engine_power(state, 1.0) == state[drive.ENGINE_POWER]
+
+
+def test_throttle_beyond_the_travel_of_the_lever_is_that_of_its_ends():
+    assert drive.throttle_power(DRIVE, -0.2) == DRIVE.power[0]
+    assert drive.throttle_power(DRIVE, 1.2) == DRIVE.power[-1]
 
 
 @pytest.mark.parametrize("deviation", [-5.0, 4.0])
