@@ -54,6 +54,29 @@ def test_trim_agrees_with_the_nonlinear_model(xv15, nonlinear, airspeed, nacelle
     assert abs(point.u[1] - truth.u[1]) < 0.005
 
 
+@pytest.mark.parametrize("form", ["layered", "plain"])
+def test_every_input_acts_alone_by_its_columns(xv15, form):
+    """Columns of inputs that are zero in most frames are left out where all of them are zero, and only there."""
+    aircraft, database = LpvAircraft(xv15.database, form=form), xv15.database
+    v, n = np.argmin(np.abs(database.airspeed - kt(60.0))), np.argmin(np.abs(database.nacelle - deg(75.0)))
+    where = (database.level_layer, v, n)
+    x, u, angle = database.x_ref[where], database.u_ref[where], database.nacelle[n]
+    still = aircraft.derivative(x, u, angle), aircraft.outputs(x, u, angle), aircraft.step(x, u, nacelle_angle=angle)
+    for k, variable in enumerate(database.inputs):
+        moved = u.copy()
+        moved[k] += 1e-6
+        if variable.name in {"gust_u", "gust_w"}:  # these move the scheduling too
+            continue
+        change = (aircraft.derivative(x, moved, angle) - still[0]) / 1e-6
+        np.testing.assert_allclose(change, database.B[where][:, k], rtol=2e-3, atol=2e-3, err_msg=variable.name)
+        change = (aircraft.outputs(x, moved, angle) - still[1]) / 1e-6
+        scale = 1e-3 * np.abs(database.D[where]).max(axis=1)
+        assert np.all(np.abs(change - database.D[where][:, k]) <= scale), variable.name
+        change = np.abs(aircraft.step(x, moved, nacelle_angle=angle) - still[2]).max()
+        unread = variable.name in {"nacelle_rate", "nacelle_acceleration"}  # a step takes them from the path
+        assert (change == 0.0) == unread, variable.name
+
+
 def test_trim_where_there_is_none(xv15):
     point = xv15.trim(airspeed=kt(40.0), nacelle=deg(20.0))
     assert not point.converged
