@@ -21,7 +21,6 @@ CONSTANTS = (
     "rtsim/frame.py",
     "rtsim/protection/law_data.py",
     "rtsim/simulation_data.py",
-    "rtsim/systems/settings.py",
     "rtsim/units.py",
 )
 """Modules besides ``*_kernels.py`` whose contents become part of compiled code."""

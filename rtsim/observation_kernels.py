@@ -81,7 +81,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
     flap_scheduled = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle)
     scratch.scheduled[0] = flap_scheduled
-    flap_inputs(tables.systems.flaps, state.flaps, flap_scheduled, state.u)
+    flap_inputs(tables.flaps, state.flaps, flap_scheduled, state.u)
     state.u[INPUT.rotor_speed] = state.drive[DEVIATION]
     plant_outputs(tables.aircraft, tables.lpv, x, state.u, angle, (scratch.y, scratch.xdot, scratch.work))
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
@@ -91,7 +91,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
     _see(tables, state, scratch, airspeed)
     y = scratch.y
-    rotor_speed = tables.systems.drive.governed_speed + state.drive[DEVIATION]
+    rotor_speed = tables.drive.governed_speed + state.drive[DEVIATION]
     power = 2.0 * y[OUTPUT.torque] * rotor_speed
 
     _ask(tables, state, scratch, time)

@@ -38,16 +38,12 @@ from rtsim.simulation_data import (
     SimulationState,
 )
 from rtsim.simulation_setup import FlightSetup, Parts, build_parts, needed_aid_error, start_state
-from rtsim.systems.drive_kernels import THROTTLE_TRIM
 from rtsim.systems.flap_kernels import FLAP_SETTING
-from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, to_deg
+from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, trim_throttle
+from rtsim.units import DEGREE, INCH_POUND, KNOT
 
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
-SAME_FLAP = deg(0.5)
-"""Flaps closer than this to a setting are at it [rad]."""
-MOST_THROTTLE_TRIM = 0.5
-"""Largest throttle trim, as a share of full power."""
 
 __all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
 
@@ -333,23 +329,15 @@ class Simulation:
         Raises:
             InputError: The angle is outside the travel of the flaps, or the database does not know what they do.
         """
-        nodes = self.tables.systems.flaps.nodes
-        if not float(nodes[0]) <= angle <= float(nodes[-1]):
-            raise InputError(
-                "is outside the travel of the flaps",
-                key="flaps",
-                value=f"{to_deg(angle):g} deg",
-                allowed=f"{to_deg(float(nodes[0])):g} to {to_deg(float(nodes[-1])):g} deg",
-                mend="angles are in radians: rtsim.units.deg converts",
-            )
+        check_flap_setting(self.tables.flaps, angle)
         self.set_aid("automatic_flaps", on=False)
         self._state.flaps[FLAP_SETTING] = angle
 
     @property
     def flap_setting(self) -> float:
         """Deflection that the flaps go to or stand at [rad]."""
-        setting = float(self._state.flaps[FLAP_SETTING])
-        return setting if setting >= 0.0 else deg(float(self._observe()[COLUMN.flap_deg]))
+        self._observe()
+        return flap_setting(self._state.flaps, float(self._scratch.scheduled[0]))
 
     def next_flap_setting(self, step: int) -> float:
         """The published flap setting beyond the present one [rad]; beyond the last one, that one.
@@ -357,10 +345,7 @@ class Simulation:
         Args:
             step: 1 down (more flap), -1 up.
         """
-        setting = self.flap_setting
-        nodes = self.tables.systems.flaps.nodes
-        beyond = nodes[nodes > setting + SAME_FLAP] if step > 0 else nodes[nodes < setting - SAME_FLAP][::-1]
-        return float(beyond[0] if beyond.size else nodes[-1 if step > 0 else 0])
+        return next_flap_setting(self.tables.flaps, self.flap_setting, step)
 
     def set_throttle_trim(self, share: float) -> None:
         """Trim the throttle from this frame on; it acts while the rotor-speed governor is off.
@@ -371,14 +356,7 @@ class Simulation:
         Raises:
             InputError: The share is out of range.
         """
-        if not -MOST_THROTTLE_TRIM <= share <= MOST_THROTTLE_TRIM:
-            raise InputError(
-                "is out of range",
-                key="throttle trim",
-                value=share,
-                allowed=f"{-MOST_THROTTLE_TRIM:g} to {MOST_THROTTLE_TRIM:g} of full power",
-            )
-        self._state.drive[THROTTLE_TRIM] = share
+        trim_throttle(self._state.drive, share)
 
     def set_fault(self, fault: Fault, on: bool) -> None:
         """Let a failure begin or end with this frame.

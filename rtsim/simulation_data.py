@@ -16,7 +16,8 @@ from rtsim.nacelle.nacelle_kernels import NacelleTables
 from rtsim.pilot.pilot_kernels import PilotTables
 from rtsim.plant_kernels import AircraftFrame
 from rtsim.protection.law_data import ProtectionTables
-from rtsim.systems.settings import Systems
+from rtsim.systems.drive_kernels import DriveTables
+from rtsim.systems.flap_kernels import FlapTables
 
 MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
 PilotMode = Literal["mocm", "external", "hold"]
@@ -70,8 +71,10 @@ class SimulationTables(NamedTuple):
     """Boundaries and levels."""
     pilot: PilotTables
     """The MOCM's gains and references."""
-    systems: Systems
-    """Flaps and rotor drive."""
+    flaps: FlapTables
+    """What moves the flaps."""
+    drive: DriveTables
+    """What turns the rotors."""
     aids: AidTables
     """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
     bare aircraft, nor on controls that are held."""

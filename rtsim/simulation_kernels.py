@@ -54,8 +54,7 @@ from rtsim.simulation_data import (
     SimulationTables,
 )
 from rtsim.systems.drive_kernels import DEVIATION, DriveTables, drive_advance, governor_power
-from rtsim.systems.flap_kernels import flap_advance, flap_now, flap_parts
-from rtsim.systems.settings import Systems
+from rtsim.systems.flap_kernels import FlapTables, flap_advance, flap_now, flap_parts
 from rtsim.units import DEGREE, KNOT
 
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
@@ -136,7 +135,7 @@ def shape(tables: SimulationTables, state: SimulationState, scratch: Scratch, ap
         angle, dt = scratch.motion[0], tables.dt
         airspeed = aids_airspeed(state.aids, state.switches, scratch.seen)
         expected = flap_schedule(tables.aircraft.controls, airspeed, angle)
-        flap_parts(tables.systems.flaps, flap_now(state.flaps, scratch.scheduled[0]), expected, scratch.flaps)
+        flap_parts(tables.flaps, flap_now(state.flaps, scratch.scheduled[0]), expected, scratch.flaps)
         aids_step(
             tables.aids, state.aids, state.switches, scratch.seen, angle, scratch.hands, scratch.flaps, acting, dt
         )
@@ -246,9 +245,9 @@ def complete(
     before = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
     governed = state.switches[GOVERNOR] != 0.0
     torque = 2.0 * scratch.y[OUTPUT.torque]
-    power = torque * (tables.systems.drive.governed_speed + state.drive[DEVIATION])
+    power = torque * (tables.drive.governed_speed + state.drive[DEVIATION])
     # Where an engine fails, collective is taken off until the power suffices to bring the rotors back too.
-    power = governor_power(tables.systems.drive, state.drive, power)
+    power = governor_power(tables.drive, state.drive, power)
     fault_actuators_begin(
         tables.faults,
         state.faults,
@@ -260,7 +259,7 @@ def complete(
         dt,
         scratch.planned,
     )
-    turn_systems(tables.systems, state, scratch.scheduled[0], torque, lever, dt)
+    turn_systems((tables.flaps, tables.drive), state, scratch.scheduled[0], torque, lever, dt)
     state.clock[CLOCK_FLAGS] = plant_step(tables.aircraft, tables.lpv, x, u, scratch.path, dt, scratch.work)
     fault_actuators_end(scratch.planned, x)
     after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
@@ -277,12 +276,17 @@ def complete(
     state.reference[1] = value_rate
     state.clock[CLOCK_FRAME] += 1.0
     disturb(tables, state, scratch, dt, air_noise)
-    state.clock[CLOCK_END] = _end_code(tables.systems.drive, tables.wind, state)
+    state.clock[CLOCK_END] = _end_code(tables.drive, tables.wind, state)
 
 
 @inner_kernel
 def turn_systems(
-    systems: Systems, state: SimulationState, scheduled: float, torque: float, lever: float, dt: float
+    systems: tuple[FlapTables, DriveTables],
+    state: SimulationState,
+    scheduled: float,
+    torque: float,
+    lever: float,
+    dt: float,
 ) -> None:
     """Move flaps and rotor speed to the start of the next frame; the inputs of this one stay as ``observe`` set them.
 
@@ -294,10 +298,11 @@ def turn_systems(
         lever: Power lever that acts.
         dt: Length of the frame [s].
     """
+    flaps, drive = systems
     automatic, governed = state.switches[AUTOMATIC_FLAPS] != 0.0, state.switches[GOVERNOR] != 0.0
-    flap_advance(systems.flaps, state.flaps, automatic, scheduled, dt)
-    available = state.faults[F_POWER] if state.faults[F_ENGINE] != 0.0 else systems.drive.power[-1]
-    drive_advance(systems.drive, state.drive, governed, torque, lever, available, dt)
+    flap_advance(flaps, state.flaps, automatic, scheduled, dt)
+    available = state.faults[F_POWER] if state.faults[F_ENGINE] != 0.0 else drive.power[-1]
+    drive_advance(drive, state.drive, governed, torque, lever, available, dt)
 
 
 @inner_kernel

@@ -51,7 +51,7 @@ from rtsim.simulation_data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.systems import load_systems
+from rtsim.systems import load_drive_tables, load_flap_tables
 from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
 from rtsim.units import to_deg, to_kt
@@ -178,7 +178,8 @@ def build_parts(setup: FlightSetup) -> Parts:
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
         corridor=load_boundary(setup.corridor, database).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
-        systems=load_systems(own),
+        flaps=load_flap_tables(own),
+        drive=load_drive_tables(own),
         aids=design_aids(database),
         gusts=gust_tables(setup.air),
         faults=fault_tables(setup.faults),

@@ -2,6 +2,6 @@
 
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
-from rtsim.systems.settings import Systems, load_systems
+from rtsim.systems.settings import load_drive_tables, load_flap_tables
 
-__all__ = ["DriveTables", "FlapTables", "Systems", "load_systems"]
+__all__ = ["DriveTables", "FlapTables", "load_drive_tables", "load_flap_tables"]

@@ -117,7 +117,7 @@ def test_the_end_says_which_way_the_rotor_speed_left_and_fits_a_statustext() -> 
         simulation.run(10 * 250)
         ends[trim] = simulation.end_reason
         assert len(simulation.end_reason) <= TEXT_LENGTH
-    drive = simulation.tables.systems.drive
+    drive = simulation.tables.drive
     assert ends[-0.5].startswith(f"rotor speed below {100.0 * drive.lowest / drive.governed_speed:.0f} %")
     assert ends[0.5].startswith(f"rotor speed above {100.0 * drive.highest / drive.governed_speed:.0f} %")
 

@@ -11,11 +11,11 @@ from rtsim.aircraft import INPUT, INPUTS, Xv15
 from rtsim.aircraft.signals import FLAP_INPUTS
 from rtsim.systems import drive_kernels as drive
 from rtsim.systems import flap_kernels as flap
-from rtsim.systems import load_systems
+from rtsim.systems import load_drive_tables, load_flap_tables
 from rtsim.units import HORSEPOWER, deg, rpm
 
-SYSTEMS = load_systems(Xv15.load().tables)
-FLAPS, DRIVE = SYSTEMS.flaps, SYSTEMS.drive
+TABLES = Xv15.load().tables
+FLAPS, DRIVE = load_flap_tables(TABLES), load_drive_tables(TABLES)
 DT = 0.004
 FULL = float(DRIVE.power[-1])
 
