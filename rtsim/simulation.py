@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rtsim import simulation_kernels as kernels
-from rtsim.aids import AIDS, AidName, aid_of
+from rtsim.aids import SWITCHES, SwitchName, switch_of
 from rtsim.aircraft.signals import INPUT, STATE
 from rtsim.atmosphere import Gust, Turbulence
 from rtsim.atmosphere.air import add_gust, normals_needed, set_turbulence
@@ -301,24 +301,24 @@ class Simulation:
             self._row[COLUMN.pilot_mode] = MODES[mode]
 
     @property
-    def aids(self) -> tuple[AidName, ...]:
-        """The pilot aids that are on."""
-        return tuple(name for name, place in AIDS.items() if self._state.switches[place] != 0.0)
+    def aids(self) -> tuple[SwitchName, ...]:
+        """The pilot aids that are on, automatic flaps and governor among them."""
+        return tuple(name for name, place in SWITCHES.items() if self._state.switches[place] != 0.0)
 
-    def set_aid(self, name: AidName, on: bool) -> None:
+    def set_aid(self, name: SwitchName, on: bool) -> None:
         """Switch a pilot aid from this frame on; no control steps.
 
         Args:
-            name: One of ``rtsim.aids.AIDS``.
+            name: One of ``rtsim.aids.SWITCHES``.
             on: On or off.
 
         Raises:
             InputError: There is no such aid, or the database does not know the aircraft without it.
         """
-        aid_of(name)
+        place = SWITCHES[switch_of(name)]
         if not on and name in self._parts.needed_aids:
             raise needed_aid_error(name)
-        self._state.switches[AIDS[name]] = 1.0 if on else 0.0
+        self._state.switches[place] = 1.0 if on else 0.0
 
     def set_flaps(self, angle: float) -> None:
         """Send the flaps to a setting from this frame on, at their rate; they no longer follow the schedule.

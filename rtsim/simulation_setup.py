@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from rtsim import simulation_kernels as kernels
-from rtsim.aids import AidName, design_aids, switches_of
+from rtsim.aids import AidName, SwitchName, design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition, Xv15
 from rtsim.aircraft import dynamics_kernels as nonlinear
@@ -123,7 +123,7 @@ class Parts:
     """Standard normals the pilot takes per frame; 0 with the noise off."""
     database_hash: str
     """Content hash of the database."""
-    needed_aids: tuple[AidName, ...]
+    needed_aids: tuple[SwitchName, ...]
     """Aids that cannot be switched off: the database does not say what the aircraft does without them."""
     start_x: FloatArray = field(repr=False)
     """Trimmed state at the start."""
@@ -228,8 +228,8 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
-def _needed_aids(setup: FlightSetup, database: Database) -> tuple[AidName, ...]:
-    needed: list[AidName] = []
+def _needed_aids(setup: FlightSetup, database: Database) -> tuple[SwitchName, ...]:
+    needed: list[SwitchName] = []
     if setup.plant != "nonlinear" and not moves_flaps(database):
         needed.append("automatic_flaps")
     if setup.plant != "nonlinear" and not turns_rotors(database):

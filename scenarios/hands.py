@@ -3,72 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol, get_args
+from typing import Any, Protocol, get_args
 
-from rtsim.aids import AIDS, AidName
+from rtsim.aids import SWITCHES, SwitchName
 from rtsim.aids.aids_kernels import MAP_STICK, scheduled
 from rtsim.command import Command
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.protection import load_boundary
-from rtsim.realtime import FlightControl
+from rtsim.realtime import FlightControl, SwitchedFlight
 from rtsim.simulation import PilotMode, Simulation
 from rtsim.sticks import INPUT_LIVE, INPUT_NONE, StickHandler, StickSettings, StickSituation, transition_schedule
 from rtsim.units import KNOT, deg
 from telemetry.mavlink import Feedback, MavlinkLink, Request
 
-if TYPE_CHECKING:
-    pass
-
 _WATCH_FRAMES = 64
 
 
-class HandedFlight(Protocol):
+class HandedFlight(SwitchedFlight, Protocol):
     """What the hands need of the flight they are in."""
 
     @property
     def simulation(self) -> Simulation:
         """What flies."""
-        ...
-
-    def switch_pilot(self, pilot: str) -> None:
-        """Hand the controls over.
-
-        Args:
-            pilot: A mode's name, or ``next``.
-        """
-        ...
-
-    def switch_aid(self, name: str, *, on: bool | None) -> None:
-        """Switch a pilot aid.
-
-        Args:
-            name: The aid.
-            on: On or off; None switches it over.
-        """
-        ...
-
-    def set_flaps(self, angle: float) -> None:
-        """Send the flaps to a setting.
-
-        Args:
-            angle: Flap deflection [rad].
-        """
-        ...
-
-    def step_flaps(self, step: int) -> None:
-        """Send the flaps to the next published setting.
-
-        Args:
-            step: 1 down, -1 up.
-        """
-        ...
-
-    def trim_throttle(self, share: float) -> None:
-        """Trim the throttle.
-
-        Args:
-            share: Engine power to add with the governor off, as a share of full power.
-        """
         ...
 
     def tell(self, kind: str, text: str) -> None:
@@ -208,7 +164,7 @@ class Hands:
         sensors = simulation.sensors()
         self._angle, self._airspeed = sensors.nacelle_angle, sensors.airspeed
         self._waiting = self._waits
-        self._known_aids: tuple[AidName, ...] | None = None
+        self._known_aids: tuple[SwitchName, ...] | None = None
         self._bits = 0.0
 
     def _serve(self, request: Request, flight: HandedFlight) -> None:
@@ -241,10 +197,10 @@ class Hands:
             return 0.0
         return float(scheduled(simulation.tables.aids, MAP_STICK, self._airspeed, self._angle))
 
-    def _aid_bits(self, aids: tuple[AidName, ...]) -> float:
+    def _aid_bits(self, aids: tuple[SwitchName, ...]) -> float:
         if aids != self._known_aids:
             self._known_aids = aids
-            self._bits = float(sum(1 << place for place, name in enumerate(AIDS) if name in aids))
+            self._bits = float(sum(1 << place for place, name in enumerate(SWITCHES) if name in aids))
         return self._bits
 
 
@@ -258,7 +214,7 @@ def _switch(request: Request, flight: HandedFlight) -> None:
             flight.step_flaps(steps[request.name])
         else:
             flight.set_flaps(request.value)
-    elif request.name in AIDS:
+    elif request.name in SWITCHES:
         on = request.name in flight.simulation.aids
         if request.value == 2.0 or (request.value == 1.0) != on:
             flight.switch_aid(request.name, on=not on)

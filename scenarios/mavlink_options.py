@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import rtsim
-from rtsim.aids import AIDS
+from rtsim.aids import SWITCHES
 from rtsim.errors import InputError
 from rtsim.sticks import StickSettings
 from rtsim.units import deg
@@ -76,7 +76,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         autopilot=options.autopilot,
         rate_hz=float(scenario.rate_hz),
         home=options.home,
-        aids={name: name in aids_on for name in AIDS},
+        aids={name: name in aids_on for name in SWITCHES},
         parameters=stick_settings(stick_map).parameters(),
         parameter_file=str(parameter_file),
         axes={str(control): source for control, source in stick_map.axes.items()},

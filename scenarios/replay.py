@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import aid_of
+from rtsim.aids import switch_of
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256
@@ -155,7 +155,7 @@ def _act(simulation: Simulation, event: LogEvent) -> None:
         simulation.reset()
         return
     if event.kind == "aid":
-        simulation.set_aid(aid_of(str(event.data["aid"])), bool(event.data["on"]))
+        simulation.set_aid(switch_of(str(event.data["aid"])), bool(event.data["on"]))
         return
     if event.kind == "flaps":
         simulation.set_flaps(float(event.data["angle"]))

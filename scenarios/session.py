@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import aid_of
+from rtsim.aids import switch_of
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults import fault_events
@@ -222,10 +222,7 @@ class FlightSession:
             change: What happens; what cannot be done (no room for another gust) is told and changes nothing.
         """
         kind, text, data = disturbance_event(change)
-        try:
-            self.simulation.disturb(change)
-        except InputError as error:
-            self._tell("refused", str(error), level="warning")
+        if not self._done(lambda: self.simulation.disturb(change)):
             return
         self._tell(kind, text, data, level="info" if kind == "turbulence" else "warning")
 
@@ -233,16 +230,12 @@ class FlightSession:
         """Switch a pilot aid from the coming frame on; one that cannot be switched is told and changes nothing.
 
         Args:
-            name: One of ``rtsim.aids.AIDS``.
+            name: One of ``rtsim.aids.SWITCHES``.
             on: On or off; None switches it over.
         """
         on = name not in self.simulation.aids if on is None else on
-        try:
-            self.simulation.set_aid(aid_of(name), on)
-        except InputError as error:
-            self._tell("refused", str(error), level="warning")
-            return
-        self._tell("aid", f"{name.replace('_', ' ')} {'on' if on else 'off'}", {"aid": name, "on": int(on)})
+        if self._done(lambda: self.simulation.set_aid(switch_of(name), on)):
+            self._tell("aid", f"{name.replace('_', ' ')} {'on' if on else 'off'}", {"aid": name, "on": int(on)})
 
     def set_flaps(self, angle: float) -> None:
         """Send the flaps to a setting from the coming frame on; what cannot be done is told and changes nothing.
@@ -250,12 +243,8 @@ class FlightSession:
         Args:
             angle: Flap deflection [rad].
         """
-        try:
-            self.simulation.set_flaps(angle)
-        except InputError as error:
-            self._tell("refused", str(error), level="warning")
-            return
-        self._tell("flaps", f"flaps to {to_deg(angle):.0f} deg", {"angle": angle})
+        if self._done(lambda: self.simulation.set_flaps(angle)):
+            self._tell("flaps", f"flaps to {to_deg(angle):.0f} deg", {"angle": angle})
 
     def step_flaps(self, step: int) -> None:
         """Send the flaps to the next published setting.
@@ -273,12 +262,8 @@ class FlightSession:
         Args:
             share: Engine power to add with the rotor-speed governor off, as a share of full power.
         """
-        try:
-            self.simulation.set_throttle_trim(share)
-        except InputError as error:
-            self._tell("refused", str(error), level="warning")
-            return
-        self._tell("throttle", f"throttle trimmed to {100.0 * share:+.0f} % of full power", {"share": share})
+        if self._done(lambda: self.simulation.set_throttle_trim(share)):
+            self._tell("throttle", f"throttle trimmed to {100.0 * share:+.0f} % of full power", {"share": share})
 
     def override_protection(self) -> None:
         """Take the authority from the protection law from the coming frame on, or give it back."""
@@ -307,6 +292,15 @@ class FlightSession:
             text: One line, for people.
         """
         self._tell(kind, text)
+
+    def _done(self, change: Callable[[], None]) -> bool:
+        """Make a change that somebody outside asked for; where it cannot be made, that is told."""
+        try:
+            change()
+        except InputError as error:
+            self._tell("refused", str(error), level="warning")
+            return False
+        return True
 
     def _tell_failures(self) -> None:
         """Record the failures of the scenario that begin or end with this frame; they act by themselves."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -32,16 +32,11 @@ from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.units import deg
 
-AidName = Literal[
-    "rate_damping",
-    "attitude_retention",
-    "altitude_hold",
-    "airspeed_hold",
-    "trim_bias",
-    "automatic_flaps",
-    "governor",
-]
-AIDS: dict[AidName, int] = {
+AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
+"""What acts between the pilot's hands and the control mixing."""
+SwitchName = Literal[AidName, "automatic_flaps", "governor"]
+"""All that can be switched in flight: the aids, and what moves flaps and rotors whoever flies."""
+SWITCHES: dict[SwitchName, int] = {
     "rate_damping": RATE_DAMPING,
     "attitude_retention": ATTITUDE_RETENTION,
     "altitude_hold": ALTITUDE_HOLD,
@@ -50,7 +45,9 @@ AIDS: dict[AidName, int] = {
     "automatic_flaps": AUTOMATIC_FLAPS,
     "governor": GOVERNOR,
 }
-"""Aids by name, with their place in the switches. The last two are on unless switched off, whoever flies."""
+"""Everything that can be switched, by name, with its place in the switches. The last two are on unless switched off."""
+AIDS: dict[AidName, int] = {name: SWITCHES[name] for name in get_args(AidName)}
+"""The aids among them."""
 RIGID_BODY = ("u", "w", "q", "pitch")
 
 
@@ -121,16 +118,16 @@ def switches_of(names: tuple[AidName, ...]) -> FloatArray:
     return switches
 
 
-def aid_of(name: str) -> AidName:
-    """The aid of a name that came from outside.
+def switch_of(name: str) -> SwitchName:
+    """The switch of a name that came from outside.
 
     Args:
         name: Any text.
 
     Raises:
-        InputError: There is no such aid.
+        InputError: There is no such switch.
     """
-    for aid in AIDS:
-        if aid == name:
-            return aid
-    raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(AIDS), mend="choose one")
+    for switch in SWITCHES:
+        if switch == name:
+            return switch
+    raise InputError("no such pilot aid", key="aid", value=name, allowed=", ".join(SWITCHES), mend="choose one")

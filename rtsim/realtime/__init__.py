@@ -2,9 +2,10 @@
 
 from rtsim.realtime.clock import wait_until
 from rtsim.realtime.control import FlightControl
-from rtsim.realtime.executive import Executive, FrameSink, FrameSource
+from rtsim.realtime.executive import Executive, FrameSink
 from rtsim.realtime.policy import OverrunPolicy
 from rtsim.realtime.report import Spread, TimingReport
+from rtsim.realtime.source import FrameSource, SwitchedFlight
 
 __all__ = [
     "Executive",
@@ -13,6 +14,7 @@ __all__ = [
     "FrameSource",
     "OverrunPolicy",
     "Spread",
+    "SwitchedFlight",
     "TimingReport",
     "wait_until",
 ]

@@ -14,7 +14,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -23,9 +23,7 @@ from rtsim.realtime.clock import wait_until
 from rtsim.realtime.control import FlightControl, Request, checked_speed, neighbouring_warp
 from rtsim.realtime.policy import OverrunPolicy
 from rtsim.realtime.report import Ending, Spread, TimingLog, TimingReport, microseconds
-
-if TYPE_CHECKING:
-    from rtsim.simulation import Disturbance
+from rtsim.realtime.source import FrameSource
 
 _NAMES = [signal.name for signal in TIMING_SIGNALS]
 _LATENESS, _WORK, _WORK_CPU, _OVERRUNS = (
@@ -39,101 +37,6 @@ SWITCH_INTERVAL_S = 0.0005
 """How long another Python thread may keep the interpreter while the loop waits for it [s]; the default is 5 ms."""
 LEAD_NS = 2_000_000
 """Time between the start of the loop and its first deadline [ns]."""
-
-
-class FrameSource(Protocol):
-    """What is flown: a simulation with everything that acts on it."""
-
-    @property
-    def dt(self) -> float:
-        """Length of a frame [s]."""
-        ...
-
-    @property
-    def finished(self) -> bool:
-        """Whether there is no further frame to fly."""
-        ...
-
-    @property
-    def end_reason(self) -> str:
-        """Why it is finished, as a sentence without full stop."""
-        ...
-
-    def step(self) -> FloatArray:
-        """Fly one frame.
-
-        Returns:
-            Its row, shape (SIGNAL_COUNT,); it may be overwritten by the next call.
-        """
-        ...
-
-    def run(self, frames: int) -> FloatArray:
-        """Fly several frames at once.
-
-        Args:
-            frames: How many at most, at least 1.
-
-        Returns:
-            Their rows, shape (flown, SIGNAL_COUNT); fewer than asked where something happens in between.
-        """
-        ...
-
-    def reset(self) -> None:
-        """Put the aircraft back to its start."""
-        ...
-
-    def switch_pilot(self, pilot: str) -> None:
-        """Hand the controls over.
-
-        Args:
-            pilot: A mode's name, or ``next``.
-        """
-        ...
-
-    def override_protection(self) -> None:
-        """Take the authority from the protection law, or give it back."""
-        ...
-
-    def switch_aid(self, name: str, *, on: bool | None) -> None:
-        """Switch a pilot aid.
-
-        Args:
-            name: The aid.
-            on: On or off; None switches it over.
-        """
-        ...
-
-    def set_flaps(self, angle: float) -> None:
-        """Send the flaps to a setting.
-
-        Args:
-            angle: Flap deflection [rad].
-        """
-        ...
-
-    def step_flaps(self, step: int) -> None:
-        """Send the flaps to the next published setting.
-
-        Args:
-            step: 1 down, -1 up.
-        """
-        ...
-
-    def trim_throttle(self, share: float) -> None:
-        """Trim the throttle.
-
-        Args:
-            share: Engine power to add with the governor off, as a share of full power.
-        """
-        ...
-
-    def disturb(self, change: Disturbance) -> None:
-        """Change the air, or let something fail or mend.
-
-        Args:
-            change: What happens.
-        """
-        ...
 
 
 class FrameSink(Protocol):

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rtsim.aids import AIDS
+from rtsim.aids import SWITCHES
 from rtsim.aids.aids_kernels import MAP_STICK_FLAPS
 from rtsim.aids.handling import handling
 from rtsim.aircraft.signals import STATE
@@ -71,7 +71,7 @@ def test_bias_centres_the_stick() -> None:
     assert rows[0][COLUMN.stick] > 0.2
 
 
-@pytest.mark.parametrize("aid", list(AIDS))
+@pytest.mark.parametrize("aid", list(SWITCHES))
 @pytest.mark.parametrize(("airspeed", "nacelle"), [(0, 90), (80, 75), (130, 25), (170, 0), (200, 0)])
 def test_switching_an_aid_does_not_step_the_controls(aid: str, airspeed: float, nacelle: float) -> None:
     """On and off in flight: no control moves by more than 1 % of its travel in any frame that follows."""
