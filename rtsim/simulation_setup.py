@@ -149,7 +149,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         InputError: The start has no trim.
     """
     loaded = load_database(setup.database or None)
-    database = flown_database(loaded)
+    database = flown_database(loaded, setup.database or None)
     lpv_aircraft = LpvAircraft(database)
     nonlinear_aircraft = Xv15.load()
     airspeed, nacelle, altitude = _start(setup)

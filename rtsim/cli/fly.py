@@ -144,7 +144,8 @@ def fly_command(
     """Fly a scenario: the XV-15, the MOCM pilot, the conversion corridor, in real time unless --speed says otherwise.
 
     While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, o
-    overrides the protection, q quits.
+    overrides the protection, t and h switch rate damping and attitude retention, u and g automatic flaps and the
+    rotor-speed governor, v and b move the flaps down and up, q quits.
 
     Args:
         scenario: Name or path.

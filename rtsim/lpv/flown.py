@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,11 +16,12 @@ from rtsim.lpv.variables import AUXILIARY_INPUTS, FLAP_INPUTS
 
 
 @functools.lru_cache(maxsize=4)
-def flown_database(database: Database) -> Database:
+def flown_database(database: Database, file: str | None = None) -> Database:
     """Give a database in the layout of the closed loop, whose kernels know the variables by their places.
 
     Args:
         database: Any database.
+        file: File it came from, for the message.
 
     Returns:
         The same one where it has that layout; where it only lacks inputs of flaps and rotor speed, a copy in which they
@@ -33,13 +35,14 @@ def flown_database(database: Database) -> Database:
         ("inputs", tuple(v for v in database.inputs if v.name not in AUXILIARY_INPUTS), _without_auxiliary()),
         ("outputs", database.outputs, OUTPUTS),
     ):
-        names, needed = [variable.name for variable in present], [variable.name for variable in wanted]
-        if names != needed:
+        found, needed = _with_units(present), _with_units(wanted)
+        if found != needed:
             raise InputError(
                 "the database has other variables than the closed loop flies",
+                file=file,
                 key=kind,
-                value=", ".join(names),
-                allowed=", ".join(needed),
+                value=found,
+                allowed=needed,
                 mend="give it these variables in this order, or use it in Python (rtsim.load_aircraft)",
             )
     if [variable.name for variable in database.inputs] == [variable.name for variable in INPUTS]:
@@ -72,6 +75,10 @@ def turns_rotors(database: Database) -> bool:
         database: A database.
     """
     return "rotor_speed" in {variable.name for variable in database.inputs}
+
+
+def _with_units(variables: Sequence[Variable]) -> str:
+    return ", ".join(f"{variable.name} [{variable.unit or '-'}]" for variable in variables)
 
 
 def _without_auxiliary() -> tuple[Variable, ...]:

@@ -18,8 +18,8 @@ _FLAPPING_WARNING_DEG, _FLAPPING_CLEAR_DEG = 10.0, 9.0
 _TORQUE_WARNING_PCT, _TORQUE_CLEAR_PCT = 100.0, 97.0
 _ROTOR_LOW_PCT, _ROTOR_HIGH_PCT, _ROTOR_CLEAR_PCT = 95.0, 105.0, 1.0
 """Rotor speed outside these is worth a warning; ours, no operating limits were found."""
-_FLAP_SPEEDS = ((0.0, 260.0), (20.0, 220.0), (40.0, 170.0), (75.0, 100.0))
-"""Flap setting [deg] and the fastest airspeed with it [kn] (NASA CR-166536)."""
+FLAP_SPEEDS = ((0.0, 260.0), (20.0, 220.0), (40.0, 170.0), (75.0, 100.0))
+"""Flap setting [deg] and the fastest airspeed with it [kn] (NASA TM X-62407, TM 81244; as the aircraft's data)."""
 _FLAP_SPEED_SLACK_KT = 1.0
 _REPEAT_S = 5.0
 _LEVELS = {1: ("caution", NOTICE), 2: ("warning", WARNING), 3: ("EXCEEDED", CRITICAL)}
@@ -150,7 +150,7 @@ class NoticeBoard:
 
 def _flap_limit(flap: float) -> float:
     """Fastest airspeed with the flaps so far out, linear between the published settings [kn]."""
-    for (low, fast), (high, slow) in pairwise(_FLAP_SPEEDS):
+    for (low, fast), (high, slow) in pairwise(FLAP_SPEEDS):
         if flap <= high:
             return fast + (slow - fast) * (flap - low) / (high - low)
-    return _FLAP_SPEEDS[-1][1]
+    return FLAP_SPEEDS[-1][1]

@@ -51,6 +51,8 @@ AID_PARAMETERS: dict[str, tuple[str, str]] = {
     "governor": ("XV_GOVERNOR", "Rotor-speed governor: 1 on; 0 off: the lever is throttle and collective."),
 }
 """Parameter name and description of every pilot aid there may be; a vehicle has those its flight has."""
+NOT_STORED = frozenset({"automatic_flaps", "governor"})
+"""Switches of the aircraft, not habits of a pilot: no flight should begin without them because of an old file."""
 
 PARAMETERS: tuple[Parameter, ...] = (
     Parameter(RESET, 0, 0, 1, "", "1 re-trims at the start condition; reads back 0.", choices=True, stored=False),
@@ -91,7 +93,8 @@ class ParameterStore:
         declared = list(PARAMETERS)
         for aid, on in aids.items():
             name, description = AID_PARAMETERS[aid]
-            declared.append(Parameter(name, float(on), 0, 1, "", description, choices=True))
+            stored = aid not in NOT_STORED
+            declared.append(Parameter(name, float(on), 0, 1, "", description, choices=True, stored=stored))
         self.declared = tuple(sorted(declared, key=lambda parameter: parameter.name))
         """All parameters; the place is the index."""
         self.index = {parameter.name: place for place, parameter in enumerate(self.declared)}
@@ -180,6 +183,8 @@ class ParameterStore:
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as failure:
             raise InputError(f"cannot be read: {failure}", file=str(path), mend="correct or delete it") from None
         for name, value in values.items():
+            if name in self.index and not self.declared[self.index[name]].stored:
+                continue
             number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
             if self.set(name, number) is None:
                 self._values = before

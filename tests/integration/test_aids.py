@@ -139,8 +139,8 @@ def fly_hold(simulation: Simulation, seconds: float, command: Callable[[Sensors]
 def test_the_nose_stays_where_it_is_while_the_flaps_come_in(plant: str) -> None:
     """From 165 kn a little more power takes the aircraft through the retraction at 170 to 180 kn, hands off.
 
-    The flaps' moment alone is 0.7 rad/s^2. Six degrees were chosen as what a hand-flown aircraft may pitch by itself;
-    without the bias's answer to the flaps it was thirty.
+    The flaps' moment alone is 0.7 rad/s^2: without the bias's answer to it the nose fell by thirty degrees on the LPV
+    aircraft. Now four are measured; six are what may not be passed.
     """
     simulation = Simulation(setup(165, 0, aids=STABILITY, plant=plant, start_altitude=1000.0))
     lever, pitch = float(simulation._state.u[1]), np.degrees(float(simulation._state.x[STATE.pitch]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
@@ -222,7 +223,7 @@ def test_a_trial_flies_with_the_flaps_and_rotors_of_its_scenario(tmp_path: Path,
 
 def without_inputs(database: Database, names: tuple[str, ...]) -> Database:
     keep = [i for i, variable in enumerate(database.inputs) if variable.name not in names]
-    return replace(
+    return dataclasses.replace(
         database,
         inputs=tuple(database.inputs[i] for i in keep),
         u_ref=database.u_ref[..., keep],
@@ -249,7 +250,12 @@ def test_a_database_without_these_inputs_flies_but_needs_both(tmp_path: Path) ->
 def test_a_database_with_other_variables_cannot_be_flown(tmp_path: Path) -> None:
     file = tmp_path / "other.nc"
     save_database(without_inputs(load_database(), ("gust_q",)), file)
-    with pytest.raises(InputError, match="other variables than the closed loop flies"):
+    with pytest.raises(InputError, match=r"other\.nc.*other variables than the closed loop flies"):
+        Simulation(hold(60, 75, database=str(file)))
+    shipped = load_database()
+    states = (dataclasses.replace(shipped.states[0], unit="kn"), *shipped.states[1:])
+    save_database(dataclasses.replace(shipped, states=states), file)
+    with pytest.raises(InputError, match=r"u \[kn\]"):
         Simulation(hold(60, 75, database=str(file)))
 
 

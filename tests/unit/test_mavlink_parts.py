@@ -6,6 +6,8 @@ import math
 import subprocess
 import sys
 import time
+import tomllib
+from importlib import resources
 
 import pytest
 from hypothesis import given
@@ -18,6 +20,7 @@ from telemetry.child_process import child_environment
 from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, endpoints, read_signing_key
 from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
 from telemetry.mavlink.framing import SignatureCheck, frames, signature_time
+from telemetry.mavlink.notices import FLAP_SPEEDS
 from telemetry.mavlink.parameters import AID_PARAMETERS, PARAMETERS, ParameterStore
 from telemetry.mavlink.peers import TokenBucket
 from telemetry.mavlink.pilot_input import StickReader
@@ -140,8 +143,8 @@ def test_work_per_datagram_is_bounded():
 
 
 @given(st.binary(max_size=600))
-def test_no_bytes_raise(data):
-    list(frames(data))
+def test_no_bytes_raise_and_none_makes_more_frames_than_it_can_hold(data):
+    assert len(list(frames(data))) <= len(data) // 8  # the shortest frame of MAVLink 1
 
 
 def one(data):
@@ -222,6 +225,29 @@ def test_parameters_are_declared_well():
     for parameter in PARAMETERS:
         assert parameter.low <= parameter.default <= parameter.high
         assert parameter.description.endswith(".")
+
+
+def test_no_flight_begins_without_governor_or_flaps_because_of_a_file(tmp_path):
+    on = {"automatic_flaps": True, "governor": True, "rate_damping": True}
+    store = ParameterStore(on, {})
+    for name in ("XV_AUTO_FLAP", "XV_GOVERNOR", "XV_SAS"):
+        store.set(name, 0.0)
+    store.save(tmp_path / "a.toml")
+    text = (tmp_path / "a.toml").read_text(encoding="utf-8")
+    assert "XV_SAS" in text
+    assert "XV_GOVERNOR" not in text
+    assert "XV_AUTO_FLAP" not in text
+    (tmp_path / "a.toml").write_text(text + "XV_GOVERNOR = 0.0\n", encoding="utf-8")
+    again = ParameterStore(on, {})
+    again.load(tmp_path / "a.toml")
+    assert (again["XV_GOVERNOR"], again["XV_SAS"]) == (1.0, 0.0)
+
+
+def test_flap_speed_limits_are_those_of_the_aircrafts_data():
+    """Telemetry reads no aircraft data; its table must say the same (NASA TM X-62407, TM 81244)."""
+    file = resources.files("rtsim.aircraft").joinpath("data", "xv15_inputs.toml")
+    data = tomllib.loads(file.read_text(encoding="utf-8"))["controls"]
+    assert list(FLAP_SPEEDS) == list(zip(data["flap_settings_deg"], data["flap_speed_limits_kt"], strict=True))
 
 
 def test_wrong_start_values_are_refused():
