@@ -1,0 +1,1 @@
+"""Tools that compare two trees; they hold no truth of their own."""
