@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from rtsim.aircraft import Xv15
+    from rtsim.aircraft.xv15.model import Xv15
     from rtsim.command import Command, Margins, Reference, Sensors
     from rtsim.corridor import Corridor, load_corridor
     from rtsim.errors import InputError, RtsimError
+    from rtsim.loop.simulation import FlightSetup, Simulation
     from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
     from rtsim.pilot import MocmError, design_mocm
     from rtsim.programme import Programme
-    from rtsim.simulation import FlightSetup, Simulation
 
 _HOME = {
     "Command": "rtsim.command",
     "Corridor": "rtsim.corridor",
-    "FlightSetup": "rtsim.simulation",
+    "FlightSetup": "rtsim.loop.simulation",
     "InputError": "rtsim.errors",
     "LpvAircraft": "rtsim.lpv.aircraft",
     "Margins": "rtsim.command",
@@ -31,8 +31,8 @@ _HOME = {
     "Reference": "rtsim.command",
     "RtsimError": "rtsim.errors",
     "Sensors": "rtsim.command",
-    "Simulation": "rtsim.simulation",
-    "Xv15": "rtsim.aircraft",
+    "Simulation": "rtsim.loop.simulation",
+    "Xv15": "rtsim.aircraft.xv15.model",
     "design_mocm": "rtsim.pilot",
     "load_aircraft": "rtsim.lpv.aircraft",
     "load_corridor": "rtsim.corridor",

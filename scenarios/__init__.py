@@ -10,22 +10,22 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scenarios.loader import library_names, load_scenario
-    from scenarios.metrics import FlightMetrics, flight_metrics
-    from scenarios.record import FlightRecord
-    from scenarios.replay import replay_log
-    from scenarios.runner import fly
-    from scenarios.scenario import Scenario
+    from rtsim.measures.metrics import FlightMetrics, flight_metrics
+    from scenarios.files.loader import library_names, load_scenario
+    from scenarios.files.scenario import Scenario
+    from scenarios.flight.replay import replay_log
+    from scenarios.flight.result import FlightRecord
+    from scenarios.flight.runner import fly
 
 _HOME = {
-    "FlightMetrics": "metrics",
-    "FlightRecord": "record",
-    "Scenario": "scenario",
-    "flight_metrics": "metrics",
-    "fly": "runner",
-    "library_names": "loader",
-    "load_scenario": "loader",
-    "replay_log": "replay",
+    "FlightMetrics": "rtsim.measures.metrics",
+    "FlightRecord": "scenarios.flight.result",
+    "Scenario": "scenarios.files.scenario",
+    "flight_metrics": "rtsim.measures.metrics",
+    "fly": "scenarios.flight.runner",
+    "library_names": "scenarios.files.loader",
+    "load_scenario": "scenarios.files.loader",
+    "replay_log": "scenarios.flight.replay",
 }
 
 __all__ = [
@@ -43,4 +43,4 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'scenarios' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"scenarios.{_HOME[name]}"), name)
+    return getattr(importlib.import_module(_HOME[name]), name)

@@ -17,9 +17,11 @@ from matplotlib.figure import Figure
 
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.frame import FloatArray
+from rtsim.loop.setup import FlightSetup
+from rtsim.loop.simulation import Simulation
+from rtsim.measures.figures import FlightFigures, figures_of_rows
 from rtsim.nacelle.automatic import AutomaticNacelle
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
-from rtsim.optimization.figures import FlightFigures, figures_of_rows
 from rtsim.optimization.path import AccelerationCaps, ConversionPath
 from rtsim.optimization.paths import PATH_NAMES, centre_line, centre_line_variable, near_stall, paper_path, table_1
 from rtsim.optimization.problem import ConversionProblem
@@ -27,8 +29,6 @@ from rtsim.optimization.search import SearchResult, run_search
 from rtsim.optimization.spec import SearchSpec, checked_spec, spec_like
 from rtsim.pilot.weights import DisplaySettings, PilotSettings
 from rtsim.programme import Programme
-from rtsim.simulation import Simulation
-from rtsim.simulation_setup import FlightSetup
 from rtsim.units import deg
 from scenarios.reproduction.drawing import BLUE, GREEN, ORANGE, PURPLE, RED, STYLE, draw_corridor
 from scenarios.reproduction.flights import BASELINE, Flight, Flyer, Variant

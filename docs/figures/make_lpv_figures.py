@@ -15,11 +15,11 @@ import matplotlib.pyplot as plt
 
 from rtsim.corridor import load_corridor
 from rtsim.frame import COLUMN
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv import load_database
-from rtsim.lpv.checks import check_neighbours
-from rtsim.simulation import FlightSetup, Simulation
+from rtsim.lpv.building.checks import check_neighbours
 from rtsim.units import DEGREE, KNOT, deg
-from scenarios.loader import load_scenario
+from scenarios.files.loader import load_scenario
 
 HERE = Path(__file__).parent
 

@@ -14,8 +14,9 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rtsim.aircraft import OUTPUT, STATE, Condition, TrimPoint, Xv15
-from rtsim.aircraft import rotor_kernels as kernels
+from rtsim.aircraft import OUTPUT, STATE, Condition, TrimPoint
+from rtsim.aircraft.xv15 import rotor_kernels as kernels
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import FOOT, HORSEPOWER, POUND_FORCE, deg, kt, rpm, to_deg
 
 HERE = Path(__file__).parent

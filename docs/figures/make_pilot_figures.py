@@ -10,11 +10,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
+from rtsim.analysis.frozen_loop import Condition, StabilityMap, frozen_loop, stability_map
 from rtsim.corridor import load_corridor
 from rtsim.lpv.database import Database
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.tables import prepare_tables
-from rtsim.pilot.frozen import Condition, StabilityMap, frozen_loop, stability_map
 from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.tables import load_pilot_tables
 from rtsim.units import deg, kt, to_deg, to_kt

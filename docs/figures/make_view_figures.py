@@ -14,10 +14,10 @@ from rerun.experimental import ViewerClient
 
 import scenarios
 from rtsim.frame import COLUMN, FloatArray
-from scenarios.options import Overrides
-from scenarios.runner import FlightOutputs
-from telemetry import rerun_viewer
-from telemetry.view_options import ViewOptions
+from scenarios.files.options import Overrides
+from scenarios.flight.runner import FlightOutputs
+from telemetry.view import viewer as rerun_viewer
+from telemetry.view.options import ViewOptions
 
 HERE = Path(__file__).parent
 PICTURES = {

@@ -11,9 +11,9 @@ import numpy as np
 
 from rtsim.command import Command
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.loop.setup import Plant
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
-from rtsim.simulation_setup import Plant
 from rtsim.units import deg, kt
 
 FLAPS = ((0, 90, 0), (0, 90, 75), (60, 75, 20), (60, 75, 75), (105, 50, 20), (130, 25, 20), (130, 25, 0), (160, 0, 20),

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.aircraft.signals import STATE
-from rtsim.compiled import inner_kernel
+from rtsim.aircraft.variables import STATE
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 # Places in the switches; 1 on, 0 off.
 RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4

@@ -26,7 +26,7 @@ from rtsim.aids.aids_kernels import (
     TRIM_BIAS,
     AidTables,
 )
-from rtsim.aircraft.signals import FLAP_INPUTS
+from rtsim.aircraft.variables import FLAP_INPUTS
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database

@@ -1,8 +1,7 @@
-"""The nonlinear XV-15 in its plane of symmetry, from published data."""
+"""Aircraft: their states, inputs and outputs as data, and the XV-15 made from published data."""
 
-from rtsim.aircraft.model import Xv15
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.signals import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES, Variable
+from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES, Variable
 
 __all__ = [
     "INPUT",
@@ -15,5 +14,4 @@ __all__ = [
     "LinearModel",
     "TrimPoint",
     "Variable",
-    "Xv15",
 ]

@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import FOOT
 
 LOW_ALTITUDE = 1000.0 * FOOT

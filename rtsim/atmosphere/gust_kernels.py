@@ -10,8 +10,8 @@ import math
 from typing import NamedTuple
 
 from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 # The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
 G_U = T_SIZE

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rtsim.cli.flight_condition import (
+from rtsim.analysis.flight_condition import (
     Request,
     checked,
     checked_outer_loop,

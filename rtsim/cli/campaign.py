@@ -160,7 +160,7 @@ def _save(result: CampaignResult, report: dict[str, Any], folder: Path) -> None:
     """Write the report, and every flight with its metrics."""
     import json
 
-    from scenarios.verdict_metrics import TRIAL_METRICS
+    from rtsim.measures.trial_metrics import TRIAL_METRICS
 
     with whole_file(folder / "report.json") as temporary:
         temporary.write_text(json.dumps(_finite(report), indent=1), encoding="utf-8")
@@ -187,7 +187,7 @@ def _finite(value: Any) -> Any:
 
 def _write_junit(result: CampaignResult, path: Path) -> None:
     """One testcase for each expectation, and one that the law under test runs."""
-    from scenarios.verdict_junit import JunitCase, junit_xml
+    from scenarios.verdicts.junit import JunitCase, junit_xml
 
     law = result.task.laws[0].label
     suite = f"rtsim.campaign.{result.spec.name}.{law}"

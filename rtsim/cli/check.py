@@ -69,7 +69,7 @@ def file_problems(name: str) -> list[str]:
     if Path(name).suffix in DATABASE_SUFFIXES:
         return _database_problems(Path(name))
     from rtsim.plugins import suggestion
-    from scenarios.loader import scenario_problems
+    from scenarios.files.loader import scenario_problems
 
     suffix = Path(name).suffix
     if suffix and suffix != ".toml" and "/" not in suffix:
@@ -87,8 +87,8 @@ def file_problems(name: str) -> list[str]:
             return _campaign_problems(name)
     problems = scenario_problems(name)
     if not problems:
-        from scenarios.loader import load_scenario
-        from scenarios.preflight import preflight_problems, start_problems
+        from scenarios.files.loader import load_scenario
+        from scenarios.flight.preflight import preflight_problems, start_problems
 
         scenario = load_scenario(name)
         problems = preflight_problems(scenario) + start_problems(scenario)
@@ -124,7 +124,7 @@ def _database_problems(path: Path) -> list[str]:
     if not path.is_file():
         return [str(InputError("does not exist", file=str(path), mend="check the path"))]
     try:
-        from rtsim.lpv.storage import load_database
+        from rtsim.lpv.files.storage import load_database
 
         load_database(path)
     except RtsimError as error:

@@ -88,7 +88,7 @@ def corridor_command(
 
 def _inconsistencies(corridor: Corridor) -> list[dict[str, Any]]:
     """Stretches where the corridor is wider than the level trims of the shipped aircraft within their limits."""
-    from rtsim.lpv.storage import load_database
+    from rtsim.lpv.files.storage import load_database
     from rtsim.protection import check_consistency
     from rtsim.units import to_deg, to_kt
 

@@ -15,9 +15,9 @@ from rtsim.cli.output import console, progress
 if TYPE_CHECKING:
     from rtsim.frame import FloatArray
     from rtsim.realtime import FlightControl
-    from scenarios.record import FlightRecord, Verdict
-    from scenarios.scenario import Scenario
-    from telemetry.log_format import LogEvent
+    from scenarios.files.scenario import Scenario
+    from scenarios.flight.result import FlightRecord, Verdict
+    from telemetry.log.format import LogEvent
 
 STATUS_PERIOD_S = 0.25
 """Time between two status lines [s]."""
@@ -262,7 +262,7 @@ def _print_metrics(summary: dict[str, Any]) -> None:
 
 def _measured(verdict: Verdict) -> str:
     """What was measured and allowed, with its unit; one part in ten thousand of the limit is as good as nothing."""
-    from scenarios.metrics import metric_unit
+    from rtsim.measures.metrics import metric_unit
 
     value, limit = verdict.value, verdict.limit
     if isinstance(value, bool) or isinstance(limit, bool):

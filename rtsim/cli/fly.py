@@ -19,9 +19,9 @@ from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
 
 if TYPE_CHECKING:
     from rtsim.realtime import FlightControl
-    from scenarios.record import FlightRecord
-    from scenarios.scenario import Scenario
-    from telemetry.view_options import ViewOptions
+    from scenarios.files.scenario import Scenario
+    from scenarios.flight.result import FlightRecord
+    from telemetry.view.options import ViewOptions
 
 EXIT_BY_SIGNAL = {signal.SIGINT: 130, signal.SIGTERM: 143}
 """Exit codes after a clean end that a signal asked for."""
@@ -189,9 +189,9 @@ def fly_command(
     """
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
-    from scenarios.options import Overrides, chosen_scenario
-    from scenarios.pilots import HAND_PILOT
-    from scenarios.preflight import preflight_problems
+    from scenarios.files.options import Overrides, chosen_scenario
+    from scenarios.flight.pilots import HAND_PILOT
+    from scenarios.flight.preflight import preflight_problems
 
     OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
@@ -219,7 +219,7 @@ def fly_command(
         raise problem
     link = None
     if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
-        from scenarios.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced
+        from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced
 
         link = MavlinkOptions(
             targets=tuple(mavlink or ()),
@@ -300,7 +300,7 @@ def process_age_s() -> float | None:
 
 def _view_options(*, headless: bool, record: Path | None, layout: Literal["pilot", "engineer"]) -> ViewOptions | None:
     """What to show; None for nothing. Without a display the viewer is left out, which is said."""
-    from telemetry.view_options import ViewOptions, display_available
+    from telemetry.view.options import ViewOptions, display_available
 
     if record is not None and record.suffix != ".rrd":
         raise InputError("must end in .rrd", key="--record", value=str(record), mend="name it FILE.rrd")
@@ -333,7 +333,7 @@ def _fly(
     ]
     describe(scenario, speed=speed, outputs=places)
     screen = FlightScreen(scenario, control, paced=not math.isinf(speed))
-    from scenarios.runner import FlightOutputs, fly
+    from scenarios.flight.runner import FlightOutputs, fly
 
     with screen.cold_start_notice() as started, _stopping_signals(control) as signals, KeyReader(control) as keys:
         if keys.active and not math.isinf(speed):

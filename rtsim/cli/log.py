@@ -10,7 +10,7 @@ import typer
 from rtsim.cli.output import console, emit_json, results
 
 if TYPE_CHECKING:
-    from telemetry.log_reader import FlightLog
+    from telemetry.log.reader import FlightLog
 
 LogArgument = Annotated[Path, typer.Argument(help="A flight log, as written by rtsim fly --log.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
@@ -46,8 +46,8 @@ def plot_command(
         InputError: It is no log, or holds no flight.
         OutputError: The pictures cannot be written.
     """
-    from telemetry.flight_plots import plot_flight
-    from telemetry.log_reader import read_log
+    from telemetry.log.flight_plots import plot_flight
+    from telemetry.log.reader import read_log
 
     flight = read_log(log)
     files = plot_flight(flight, out or log.with_name(f"{log.stem}-plots"))
@@ -68,7 +68,7 @@ def info_command(log: LogArgument, *, json: JsonOption = False) -> None:
     Raises:
         InputError: It is no log.
     """
-    from telemetry.log_reader import read_log
+    from telemetry.log.reader import read_log
 
     flight = read_log(log)
     info = _information(flight)
@@ -95,8 +95,8 @@ def export_command(
         InputError: It is no log, or the ending is unknown.
         OutputError: The file cannot be written.
     """
-    from telemetry.log_export import export_log
-    from telemetry.log_reader import read_log
+    from telemetry.log.export import export_log
+    from telemetry.log.reader import read_log
 
     flight = read_log(log)
     export_log(flight, target)

@@ -43,10 +43,10 @@ COMMAND_MODULES = (
 
 def database_hash() -> str:
     """Give the SHA-256 of the shipped LPV database, or say why there is none."""
-    if importlib.util.find_spec("rtsim.lpv.storage") is None:
+    if importlib.util.find_spec("rtsim.lpv.files.storage") is None:
         return "none"
     try:
-        database = importlib.import_module("rtsim.lpv.storage").load_database()
+        database = importlib.import_module("rtsim.lpv.files.storage").load_database()
     except RtsimError:
         return "none"
     return str(database.content_hash)

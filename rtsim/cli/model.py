@@ -62,8 +62,8 @@ def build_command(
     Raises:
         OutputError: The file could not be written.
     """
-    from rtsim.lpv.database_file import SHIPPED
-    from rtsim.lpv.storage import save_database
+    from rtsim.lpv.files.netcdf import SHIPPED
+    from rtsim.lpv.files.storage import save_database
 
     target = out if out is not None else SHIPPED
     _require_suffix(target)
@@ -78,9 +78,9 @@ def build_command(
 
 
 def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> Database:
-    from rtsim.lpv.build import build_database
-    from rtsim.lpv.grid import conversion_grid
-    from rtsim.lpv.xv15 import Xv15Grid
+    from rtsim.lpv.building.build import build_database
+    from rtsim.lpv.building.grid import conversion_grid
+    from rtsim.lpv.building.xv15_grid import Xv15Grid
 
     share = 1.0 if without_pilot else _BUILD_SHARE
     database = build_database(Xv15Grid(), conversion_grid(), jobs=jobs, progress=lambda part: advance(share * part))
@@ -114,8 +114,8 @@ def info_command(
     Raises:
         InputError: The file is missing or not a usable database.
     """
-    from rtsim.lpv.database_file import SHIPPED
-    from rtsim.lpv.storage import load_database
+    from rtsim.lpv.files.netcdf import SHIPPED
+    from rtsim.lpv.files.storage import load_database
 
     database = load_database(file)
     result = {"file": str(file if file is not None else SHIPPED), **summary(database)}
@@ -139,7 +139,7 @@ def export_command(
     Raises:
         InputError: The name ends in neither .nc nor .mat, or the database is not usable.
     """
-    from rtsim.lpv.storage import load_database, save_database
+    from rtsim.lpv.files.storage import load_database, save_database
 
     _require_suffix(file)
     save_database(load_database(database), file)
@@ -171,7 +171,7 @@ def import_command(
     Raises:
         InputError: The file is not a usable database: the message names the array and what is wrong.
     """
-    from rtsim.lpv.storage import load_database, save_database
+    from rtsim.lpv.files.storage import load_database, save_database
 
     _require_suffix(file)
     target = out if out is not None else file.with_name(f"{file.stem}.rtsim.nc")
@@ -200,7 +200,7 @@ def summary(database: Database) -> dict[str, Any]:
     """
     import numpy as np
 
-    from rtsim.lpv.checks import NEIGHBOUR_LIMIT, check_neighbours
+    from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, check_neighbours
     from rtsim.units import DEGREE, KNOT
 
     inside = _inside_corridor(database)
@@ -245,7 +245,7 @@ def _inside_corridor(database: Database) -> npt.NDArray[np.bool_]:
 
 def _is_current(database: Database) -> bool | None:
     """Whether the aircraft has not changed since the database was built; None where it is not ours."""
-    from rtsim.lpv.xv15 import source_sha256, still_trims
+    from rtsim.lpv.building.xv15_grid import source_sha256, still_trims
 
     stored = database.attributes.get("source_sha256")
     return None if stored is None else stored == source_sha256() and still_trims(database)

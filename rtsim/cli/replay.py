@@ -35,7 +35,7 @@ def replay_command(
     Raises:
         InputError: It is no log, or holds no frames.
     """
-    from scenarios.replay import replay_log
+    from scenarios.flight.replay import replay_log
 
     result = replay_log(log)
     for change in result.changed_versions:

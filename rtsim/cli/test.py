@@ -11,8 +11,8 @@ from rtsim.cli.output import console, emit_json, progress, results, whole_file
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError, RtsimError
 
 if TYPE_CHECKING:
-    from scenarios.scenario import PlantName, Scenario
-    from scenarios.verdict import Case
+    from scenarios.files.scenario import PlantName, Scenario
+    from scenarios.verdicts.tester import Case
 
 
 def register(app: typer.Typer) -> None:
@@ -62,7 +62,7 @@ def run_tests(
     if junit is not None:
         _write_junit(cases, junit)
     if html is not None:
-        from scenarios.verdict_report import html_report
+        from scenarios.verdicts.html_report import html_report
 
         with whole_file(html) as temporary:
             temporary.write_text(html_report(cases), encoding="utf-8")
@@ -85,8 +85,8 @@ def run_tests(
 
 def _chosen(paths: list[str]) -> list[Scenario]:
     """Load what is to be tested, before anything is flown."""
-    from scenarios.loader import library_names, load_scenario
-    from scenarios.verdict import is_test
+    from scenarios.files.loader import library_names, load_scenario
+    from scenarios.verdicts.tester import is_test
 
     names: list[str | Path] = []
     for path in paths:
@@ -111,7 +111,7 @@ def _chosen(paths: list[str]) -> list[Scenario]:
 
 
 def _flown(scenarios: list[Scenario], protection: str | None, plant: PlantName | None) -> list[Case]:
-    from scenarios.verdict import Tester, broken_case
+    from scenarios.verdicts.tester import Tester, broken_case
 
     tester = Tester(law=protection, plant=plant)
     cases = []
@@ -126,8 +126,8 @@ def _flown(scenarios: list[Scenario], protection: str | None, plant: PlantName |
 
 
 def _write_junit(cases: list[Case], path: Path) -> None:
-    from scenarios.verdict import LAW_CLAUSE
-    from scenarios.verdict_junit import JunitCase, junit_xml
+    from scenarios.verdicts.junit import JunitCase, junit_xml
+    from scenarios.verdicts.tester import LAW_CLAUSE
 
     document = junit_xml(
         "rtsim test",
@@ -158,7 +158,7 @@ def _write_junit(cases: list[Case], path: Path) -> None:
 def _bundles(cases: list[Case], out: Path | None) -> dict[str, str]:
     if out is None:
         return {}
-    from scenarios.verdict_bundle import write_bundle
+    from scenarios.verdicts.bundle import write_bundle
 
     found = {}
     for case in cases:

@@ -49,7 +49,7 @@ def timing_command(
     Raises:
         InputError: An option is out of range.
     """
-    from scenarios.options import RATE_RANGE
+    from scenarios.files.options import RATE_RANGE
 
     if not 0.1 <= duration <= 3600.0:
         raise InputError(
@@ -70,13 +70,13 @@ def timing_command(
 
 def _measure(duration: float, rate: int) -> tuple[TimingReport, TimingLog]:
     """Fly the hover live, with nothing attached to it."""
+    from rtsim.loop.simulation import Simulation
     from rtsim.realtime import Executive
-    from rtsim.simulation import Simulation
-    from scenarios.flight_setup import flight_frames, flight_setup
-    from scenarios.loader import load_scenario
-    from scenarios.options import Overrides, with_overrides
-    from scenarios.session import FlightSession
-    from scenarios.sinks import FlightSinks
+    from scenarios.files.loader import load_scenario
+    from scenarios.files.options import Overrides, with_overrides
+    from scenarios.flight.flight_setup import flight_frames, flight_setup
+    from scenarios.flight.session import FlightSession
+    from scenarios.flight.sinks import FlightSinks
 
     scenario = with_overrides(load_scenario("hover"), Overrides(duration=duration, rate_hz=rate))
     simulation = Simulation(flight_setup(scenario))

@@ -180,7 +180,7 @@ def load_corridor(name: str = "design") -> Corridor:
     Raises:
         InputError: There is no such corridor.
     """
-    data = tomllib.loads(resources.files("rtsim.corridor").joinpath("data", _FILE).read_text(encoding="utf-8"))
+    data = tomllib.loads(resources.files("rtsim.aircraft.xv15").joinpath("data", _FILE).read_text(encoding="utf-8"))
     if name not in data["corridor"]:
         raise InputError("no such corridor", key="corridor", value=name, allowed=", ".join(data["corridor"]))
     entry, levels = data["corridor"][name], data["levels"]

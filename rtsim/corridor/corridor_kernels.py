@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 LOW, HIGH, NACELLE_FORWARD, NACELLE_AFT = 0, 1, 2, 3
 """Places of the margins in the array that ``corridor_margins`` fills."""

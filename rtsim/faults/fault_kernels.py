@@ -3,7 +3,7 @@
 A frame uses them in this order: ``fault_update`` switches failures on and off at the start of the frame;
 ``fault_airspeed_error`` and ``fault_nacelle_ok`` give what the sensors show; ``fault_nacelle_rate`` limits the nacelle
 command; ``fault_actuators_begin`` and ``fault_actuators_end`` stand around the plant's step, which knows nothing of
-failures. They work on the states that every plant has (``rtsim.aircraft.signals``). Equations: docs/faults.md.
+failures. They work on the states that every plant has (``rtsim.aircraft.variables``). Equations: docs/faults.md.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.aircraft.dynamics_kernels import commanded_controls
-from rtsim.aircraft.signals import STATE
 from rtsim.aircraft.table_kernels import curve
-from rtsim.aircraft.tables import ControlTables
-from rtsim.compiled import inner_kernel
+from rtsim.aircraft.variables import STATE
+from rtsim.aircraft.xv15.dynamics_kernels import commanded_controls
+from rtsim.aircraft.xv15.tables import ControlTables
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 # Kinds, as numbers in the schedule.
 KIND_NACELLE_JAMMED = 0

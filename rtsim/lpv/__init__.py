@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
     from rtsim.lpv.database import Database, PilotArrays
-    from rtsim.lpv.storage import load_database, save_database
+    from rtsim.lpv.files.storage import load_database, save_database
 
 __all__ = ["Database", "LpvAircraft", "PilotArrays", "load_aircraft", "load_database", "save_database"]
 
@@ -16,8 +16,8 @@ _HOMES = {
     "load_aircraft": "rtsim.lpv.aircraft",
     "Database": "rtsim.lpv.database",
     "PilotArrays": "rtsim.lpv.database",
-    "load_database": "rtsim.lpv.storage",
-    "save_database": "rtsim.lpv.storage",
+    "load_database": "rtsim.lpv.files.storage",
+    "save_database": "rtsim.lpv.files.storage",
 }
 
 

@@ -13,7 +13,7 @@ from rtsim.aircraft.points import TrimPoint
 from rtsim.errors import InputError, TrimError
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.tables import Form, Refresh, prepare_tables
 from rtsim.lpv.variables import position, required_position
 from rtsim.units import to_deg, to_kt

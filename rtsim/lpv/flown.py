@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aircraft.signals import INPUTS, OUTPUTS, STATES, Variable
+from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES, Variable
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.lpv.variables import AUXILIARY_INPUTS, FLAP_INPUTS

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.compiled import inner_kernel
+from rtsim.kernels.compiled import inner_kernel
 from rtsim.lpv.schedule_kernels import (
     FLAG_AIRSPEED_HIGH,
     FLAG_AIRSPEED_LOW,

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.aircraft.signals import SCHEDULING_SPEED
-from rtsim.compiled import inner_kernel
+from rtsim.aircraft.variables import SCHEDULING_SPEED
+from rtsim.kernels.compiled import inner_kernel
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rtsim.aircraft.signals import FLAP_INPUTS, Variable
+from rtsim.aircraft.variables import FLAP_INPUTS, Variable
 from rtsim.errors import InputError
 
 __all__ = [

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 FILTERED_AIRSPEED, LAST_RATE, STARTED = 0, 1, 2
 """Places in the law's state: airspeed [m/s], rate commanded last [rad/s], whether it has begun (0, 1)."""

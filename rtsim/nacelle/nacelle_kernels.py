@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
-from rtsim.ramp_filter_kernels import critically_damped_ramp
+from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 
 COMMAND_ANGLE, ANGLE, RATE = 0, 1, 2
 """Places in the actuator's state [rad, rad, rad/s]."""

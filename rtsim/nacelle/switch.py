@@ -35,7 +35,7 @@ def load_nacelle_tables(*, extended_aft_travel: bool = False) -> NacelleTables:
     Args:
         extended_aft_travel: Let the nacelles go to 95 deg instead of 90.
     """
-    text = resources.files("rtsim.nacelle").joinpath("data", "nacelle.toml").read_text(encoding="utf-8")
+    text = resources.files("rtsim.aircraft.xv15").joinpath("data", "nacelle.toml").read_text(encoding="utf-8")
     data = tomllib.loads(text)
     travel, switch = data["travel"], data["switch"]
     detents = np.array(sorted(deg(angle) for angle in switch["detents_deg"]))

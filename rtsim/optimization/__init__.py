@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rtsim.optimization.batch import BatchFlight, BatchFlyer
-    from rtsim.optimization.figures import FlightFigures, figures_of_rows
     from rtsim.optimization.path import AccelerationCaps, ConversionPath, path_through
     from rtsim.optimization.paths import PATH_NAMES, paper_path
     from rtsim.optimization.problem import ConversionProblem
@@ -19,8 +18,6 @@ if TYPE_CHECKING:
 _HOME = {
     "BatchFlight": "batch",
     "BatchFlyer": "batch",
-    "FlightFigures": "figures",
-    "figures_of_rows": "figures",
     "AccelerationCaps": "path",
     "ConversionPath": "path",
     "path_through": "path",
@@ -41,11 +38,9 @@ __all__ = [
     "BatchFlyer",
     "ConversionPath",
     "ConversionProblem",
-    "FlightFigures",
     "SearchResult",
     "SearchSpec",
     "checked_spec",
-    "figures_of_rows",
     "load_spec",
     "paper_path",
     "path_through",

@@ -17,12 +17,12 @@ import numpy as np
 
 from rtsim.atmosphere.air import normals_needed
 from rtsim.frame import SIGNAL_COUNT
-from rtsim.optimization import merit_kernels as kernels
-from rtsim.optimization.figures import FlightFigures, figures_from_sums
+from rtsim.loop.data import CLOCK_END, END_NONE, Scratch
+from rtsim.loop.setup import FlightSetup, Parts, build_parts, start_state
+from rtsim.measures import merit_kernels as kernels
+from rtsim.measures.figures import FlightFigures, figures_from_sums
 from rtsim.programme import Programme
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
-from rtsim.simulation_data import CLOCK_END, END_NONE, Scratch
-from rtsim.simulation_setup import FlightSetup, Parts, build_parts, start_state
 
 CHUNK_FRAMES = 2_048
 """Frames for which noise is drawn at a time."""

@@ -163,7 +163,7 @@ def trim_flapping_map() -> tuple[FloatArray, FloatArray, FloatArray]:
         Airspeeds [kn], shape (v,); nacelle angles [deg], shape (n,); flapping magnitude [deg], shape (v, n), NaN where
         the level layer has no trim.
     """
-    from rtsim.aircraft.signals import STATE
+    from rtsim.aircraft.variables import STATE
     from rtsim.lpv.aircraft import load_aircraft
 
     database = load_aircraft().database

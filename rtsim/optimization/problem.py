@@ -11,12 +11,12 @@ import numpy as np
 
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.frame import FloatArray
+from rtsim.loop.setup import FlightSetup
+from rtsim.measures.figures import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
-from rtsim.optimization.figures import FlightFigures, objective_value
 from rtsim.optimization.path import ConversionPath, path_through
 from rtsim.optimization.paths import FINAL_AIRSPEED_KT, PATH_NAMES, paper_path
 from rtsim.optimization.spec import SearchSpec
-from rtsim.simulation_setup import FlightSetup
 
 NACELLE_START_DEG = 90.0
 COORDINATE_DIGITS = 3

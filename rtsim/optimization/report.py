@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from rtsim.measures.figures import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
-from rtsim.optimization.figures import FlightFigures, objective_value
 from rtsim.optimization.path import ConversionPath
 from rtsim.optimization.problem import ConversionProblem
 from rtsim.optimization.search import SearchResult
@@ -99,7 +99,7 @@ def figures_summary(figures: FlightFigures) -> dict[str, Any]:
     Args:
         figures: The flight.
     """
-    from rtsim.optimization.figures import OBJECTIVES
+    from rtsim.measures.figures import OBJECTIVES
 
     return {
         **dataclasses.asdict(figures),

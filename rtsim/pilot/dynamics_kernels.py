@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.compiled import inner_kernel
+from rtsim.kernels.compiled import inner_kernel
 from rtsim.pilot.layout_kernels import (
     INTEGRALS,
     R_A,

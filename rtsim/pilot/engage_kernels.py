@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtsim.compiled import kernel
+from rtsim.kernels.compiled import kernel
 from rtsim.pilot.layout_kernels import (
     INTEGRALS,
     LOOP_INTEGRATORS,

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from rtsim.compiled import inner_kernel, kernel
+from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.pilot.dynamics_kernels import (
     Held,
     gains_of,

@@ -118,7 +118,7 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
     if name != "model":
         return load_corridor(name)
     if database is None:
-        from rtsim.lpv.storage import load_database
+        from rtsim.lpv.files.storage import load_database
 
         database = load_database()
     return model_corridor(database)
@@ -158,7 +158,7 @@ def trim_range(database: Database) -> tuple[FloatArray, FloatArray]:
     Args:
         database: The trims.
     """
-    from rtsim.lpv.grid import conversion_grid
+    from rtsim.lpv.building.grid import conversion_grid
 
     valid = database.valid[database.level_layer]
     grid = conversion_grid()

@@ -12,7 +12,7 @@ import numpy as np
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.lpv.database import Database
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels, limiter_kernels

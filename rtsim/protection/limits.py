@@ -86,7 +86,7 @@ class Limits:
 @cache
 def protection_data() -> dict[str, Any]:
     """Read ``data/protection.toml``."""
-    text = resources.files("rtsim.protection").joinpath("data", "protection.toml").read_text(encoding="utf-8")
+    text = resources.files("rtsim.aircraft.xv15").joinpath("data", "protection.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 

@@ -11,7 +11,7 @@ from rtsim.command import Command, Sensors
 from rtsim.corridor import LEVEL_NAMES
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.lpv.database import Database
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
 from rtsim.protection.boundary import BoundaryName, load_boundary, model_corridor
 from rtsim.protection.law_data import SENSOR_COUNT

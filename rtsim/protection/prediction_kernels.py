@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import GRAVITY
 
 # Places in one cell of ModelTables.cells.
@@ -270,7 +270,7 @@ def roll_out(
         w += step * b
         carried += step * missing
         missing *= fade
-        # The nacelles' critically damped filter of a ramp, in closed form (rtsim.ramp_filter_kernels).
+        # The nacelles' critically damped filter of a ramp, in closed form (rtsim.kernels.ramp_filter_kernels).
         r = wanted if k * step < hold - 1e-9 else 0.0
         if command + r * step < tables.forward_stop:
             r = (tables.forward_stop - command) / step

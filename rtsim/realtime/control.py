@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from rtsim.errors import InputError
 
 if TYPE_CHECKING:
-    from rtsim.simulation import Disturbance
+    from rtsim.loop.simulation import Disturbance
 
 Action = Literal[
     "pause",

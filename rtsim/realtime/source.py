@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 from rtsim.frame import FloatArray
 
 if TYPE_CHECKING:
-    from rtsim.simulation import Disturbance
+    from rtsim.loop.simulation import Disturbance
 
 
 class SwitchedFlight(Protocol):

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.compiled import inner_kernel
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 DEVIATION, ENGINE_POWER, THROTTLE_OFFSET, GOVERNED, THROTTLE_TRIM = 0, 1, 2, 3, 4
 """Places in the state: rotor speed less the governed one [rad/s]; shaft power that the engines give, and what it is

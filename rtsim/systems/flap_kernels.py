@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.aircraft.signals import INPUT
-from rtsim.compiled import inner_kernel
+from rtsim.aircraft.variables import INPUT
 from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import inner_kernel
 
 FLAP, FLAP_FOLLOWS, FLAP_SETTING = 0, 1, 2
 """Places in the state: deflection [rad], whether the flaps are where the schedule has them (0, 1), setting to go to

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aircraft.tables import AircraftTables
+from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.faults.fault import ENGINE_RATING, TRANSMISSION_EFFICIENCY
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
@@ -23,7 +23,7 @@ FULL_POWER = ENGINES * ENGINE_RATING["contingency"] * TRANSMISSION_EFFICIENCY
 
 @cache
 def _data() -> dict[str, Any]:
-    text = resources.files("rtsim.systems").joinpath("data", "systems.toml").read_text(encoding="utf-8")
+    text = resources.files("rtsim.aircraft.xv15").joinpath("data", "systems.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 

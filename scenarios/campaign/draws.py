@@ -16,8 +16,8 @@ from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
 from rtsim.units import deg, kt
 from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
 from scenarios.campaign.trial import FlightPlan, has_trim
-from scenarios.loader import load_scenario
-from scenarios.script import Pulse
+from scenarios.files.loader import load_scenario
+from scenarios.files.script import Pulse
 
 ATTEMPTS = 200
 """Starts drawn before a class is said to have none inside the corridor."""

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rtsim import simulation_kernels as simulation
 from rtsim.command import Command, Margins, Pilot, Reference, Sensors
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.observation_kernels import sense
+from rtsim.loop import advance_kernels as simulation
+from rtsim.loop.data import CLOCK_END, CLOCK_FRAME, END_NONE, Scratch
+from rtsim.loop.observe_kernels import sense
 from rtsim.protection import law_data
 from rtsim.protection.chain import LawChain
 from rtsim.protection.limits import LIMIT_KINDS
-from rtsim.simulation_data import CLOCK_END, CLOCK_FRAME, END_NONE, Scratch
 from rtsim.units import DEGREE
 from scenarios.campaign import trial_kernels as kernels
-from scenarios.script_kernels import script_command
+from scenarios.files.script_kernels import script_command
 
 if TYPE_CHECKING:
     from scenarios.campaign.trial import Flying

@@ -258,8 +258,8 @@ def identity(task: Task) -> dict[str, Any]:
     Args:
         task: The campaign.
     """
-    from rtsim.lpv.storage import load_database
-    from scenarios.flight_setup import versions
+    from rtsim.lpv.files.storage import load_database
+    from scenarios.flight.flight_setup import versions
 
     return {
         "campaign": hashlib.sha256(task.text.encode()).hexdigest(),

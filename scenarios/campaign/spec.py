@@ -15,10 +15,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rtsim.errors import InputError
 from rtsim.plugins import closest, suggestion
-from scenarios.problems import explain
-from scenarios.scenario import CorridorName
-from scenarios.verdict_events import EVENTS
-from scenarios.verdict_trial import LARGEST_LEVER, LARGEST_STICK
+from scenarios.files.problems import explain
+from scenarios.files.scenario import CorridorName
+from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
+from scenarios.verdicts.events import EVENTS
 
 Generator = np.random.Generator
 Finite = Annotated[float, Field(allow_inf_nan=False)]

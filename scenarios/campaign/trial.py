@@ -10,13 +10,24 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rtsim.aircraft.signals import STATE
+from rtsim.aircraft.variables import STATE
 from rtsim.atmosphere import AirSpecification
 from rtsim.atmosphere.air import gust_tables, normals_needed
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.loop.data import (
+    CLOCK_END,
+    CLOCK_SINK,
+    END_NONE,
+    Scratch,
+    SimulationState,
+    SimulationTables,
+)
+from rtsim.loop.setup import FlightSetup, Parts, Plant, build_parts, start_state
+from rtsim.loop.simulation import END_REASONS
+from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.protection import law_data
 from rtsim.protection.boundary import BoundaryName
@@ -25,21 +36,10 @@ from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import load_limits
 from rtsim.protection.tables import law_tables
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
-from rtsim.simulation import END_REASONS
-from rtsim.simulation_data import (
-    CLOCK_END,
-    CLOCK_SINK,
-    END_NONE,
-    Scratch,
-    SimulationState,
-    SimulationTables,
-)
-from rtsim.simulation_setup import FlightSetup, Parts, Plant, build_parts, start_state
 from rtsim.units import to_deg, to_kt
-from scenarios import script_kernels
 from scenarios.campaign import trial_kernels as kernels
-from scenarios.script import Pulse, pulse_table
-from scenarios.verdict_metrics import TORQUE_EXCESS, TrialMetrics
+from scenarios.files import script_kernels
+from scenarios.files.script import Pulse, pulse_table
 
 if TYPE_CHECKING:
     from rtsim.command import Pilot
@@ -138,7 +138,7 @@ class Bench:
         """
         key = (name, buffer)
         if key not in self._laws:
-            from rtsim.lpv.storage import load_database
+            from rtsim.lpv.files.storage import load_database
 
             tables = law_tables(name, load_database(), dt=self.dt, boundary=self.corridor)
             settings = tables.settings
@@ -315,7 +315,8 @@ class Flying:
 @functools.lru_cache(maxsize=8)
 def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
     """Trimmed state and inputs at a start, altitude 0; kept, since a twin starts like its flight."""
-    from rtsim.aircraft import Condition, Xv15
+    from rtsim.aircraft import Condition
+    from rtsim.aircraft.xv15.model import Xv15
     from rtsim.lpv.aircraft import load_aircraft
 
     if plant == "nonlinear":

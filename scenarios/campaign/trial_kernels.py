@@ -1,6 +1,6 @@
 """One trial flight in one compiled call: aircraft, pilot, script and protection law, and what it is judged by.
 
-The frame is that of ``rtsim.simulation_kernels``; between the pilot and the aircraft stands the script.
+The frame is that of ``rtsim.loop.advance_kernels``; between the pilot and the aircraft stands the script.
 """
 
 from __future__ import annotations
@@ -8,13 +8,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.aircraft.signals import INPUT
-from rtsim.compiled import inner_kernel
+from rtsim.aircraft.variables import INPUT
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.observation_kernels import observe
-from rtsim.protection import law_data as law
-from rtsim.protection.limiter_kernels import torque_limit
-from rtsim.simulation_data import (
+from rtsim.kernels.compiled import inner_kernel
+from rtsim.loop.advance_kernels import advance, pilot_command
+from rtsim.loop.data import (
     CLOCK_END,
     CLOCK_FRAME,
     CLOCK_MODE,
@@ -24,9 +22,11 @@ from rtsim.simulation_data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.simulation_kernels import advance, pilot_command
+from rtsim.loop.observe_kernels import observe
+from rtsim.protection import law_data as law
+from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.units import DEGREE, INCH_POUND, KNOT
-from scenarios.script_kernels import script_command, script_notice
+from scenarios.files.script_kernels import script_command, script_notice
 
 WARNING_MARGIN = 4.0
 """Corridor margin at which the monitor warns and a pilot who yields begins to react [kn]."""
@@ -35,7 +35,7 @@ OUTSIDE_MARGIN, PERSISTENCE, MERGE = -0.5, 0.1, 0.5
 ARRIVED_AIRSPEED, ARRIVED_NACELLE = 1.0, 0.5
 """How near the programme's end counts as arrived [kn, deg]."""
 
-# Places in the metrics of a trial, in the order of ``scenarios.verdict_metrics.TRIAL_METRICS``.
+# Places in the metrics of a trial, in the order of ``rtsim.measures.trial_metrics.TRIAL_METRICS``.
 (
     M_EXCEEDANCES, M_DEPTH, M_OUTSIDE, M_AREA, M_MARGIN,
     M_HEIGHT_LOST, M_HEIGHT_GAINED, M_FLAPPING, M_FLAPPING_OVER, M_TORQUE, M_TORQUE_OVER,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from rtsim.frame import FloatArray
+from rtsim.measures.trial_metrics import METRIC_PLACE
 from scenarios.campaign.chunks import LawVariant
 from scenarios.campaign.spec import CampaignFile, ExpectRate
 from scenarios.campaign.statistics import Rate, bound_decided, flights_to_bound, mcnemar, quantile, rate
-from scenarios.verdict_events import EVENTS
-from scenarios.verdict_metrics import METRIC_PLACE
+from scenarios.verdicts.events import EVENTS
 
 BOOTSTRAP_SEED = 20_000
 """Added to the campaign's seed for the resampling."""

@@ -188,7 +188,7 @@ def save_figures(
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from telemetry.log_export import write_and_rename
+    from telemetry.log.export import write_and_rename
 
     files: dict[int, list[Path]] = {}
     with mpl.rc_context(STYLE):

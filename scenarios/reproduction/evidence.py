@@ -18,7 +18,7 @@ from scenarios.reproduction.flights import Flight, Flyer, Variant
 from scenarios.reproduction.measures import FlightMeasures
 
 if TYPE_CHECKING:
-    from rtsim.lpv.checks import NeighbourError
+    from rtsim.lpv.building.checks import NeighbourError
     from rtsim.lpv.database import Database
 
 COMPARED = ("airspeed_kt", "altitude_m", "pitch_deg", "flapping_deg")
@@ -89,8 +89,8 @@ def corridor_differences(reference: Mapping[str, list[float]]) -> dict[str, Numb
 
 def grid_errors() -> dict[str, dict[str, Number]]:
     """How well each linear model predicts its neighbour's trim, on our grid and on one of 10 kn (Figure 2)."""
-    from rtsim.lpv.checks import check_neighbours
-    from rtsim.lpv.storage import load_database
+    from rtsim.lpv.building.checks import check_neighbours
+    from rtsim.lpv.files.storage import load_database
 
     database = load_database()
     corridor = load_corridor("design")

@@ -53,7 +53,7 @@ def _centre_line(axes: Axes, colour: str = GREY) -> None:
 
 
 def _grid(study: Study, figure: Figure) -> None:  # noqa: ARG001
-    from rtsim.lpv.storage import load_database
+    from rtsim.lpv.files.storage import load_database
 
     database = load_database()
     axes = figure.subplots()

@@ -11,6 +11,10 @@ import numpy as np
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.atmosphere.air import normals_needed
 from rtsim.frame import SIGNAL_COUNT, SIGNAL_NAMES, FloatArray
+from rtsim.loop.advance_kernels import run_frames
+from rtsim.loop.data import CLOCK_END, CLOCK_SINK
+from rtsim.loop.setup import FlightSetup, Plant, build_parts, start_state
+from rtsim.loop.simulation import END_REASONS
 from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
 from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
 from rtsim.pilot.layout_kernels import PilotTables
@@ -18,10 +22,6 @@ from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.weights import PilotSettings
 from rtsim.programme import Programme
 from rtsim.random_streams import STREAM_TURBULENCE, stream_generator
-from rtsim.simulation import END_REASONS
-from rtsim.simulation_data import CLOCK_END, CLOCK_SINK
-from rtsim.simulation_kernels import run_frames
-from rtsim.simulation_setup import FlightSetup, Plant, build_parts, start_state
 
 RATE_HZ = 250
 """Frames per second of every flight."""
@@ -144,7 +144,7 @@ class Flyer:
         parts = build_parts(setup)
         if self._pilot is not None:
             parts = dataclasses.replace(parts, tables=parts.tables._replace(pilot=self._pilot))
-        # The same stream and order as rtsim.simulation: such a flight has the same history to the last bit.
+        # The same stream and order as rtsim.loop.simulation: such a flight has the same history to the last bit.
         random = stream_generator(variant.seed, STREAM_TURBULENCE)
         state = start_state(setup, parts, random.standard_normal(3))
         frames = max(1, math.ceil(programme.duration * RATE_HZ - 1e-6))

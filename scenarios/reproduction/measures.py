@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from rtsim.corridor import load_corridor
 from rtsim.frame import FloatArray
+from rtsim.measures.metrics import FlightMetrics, flight_metrics
 from rtsim.optimization.paths import TABLE_1
 from rtsim.units import deg, kt, to_kt
-from scenarios.metrics import FlightMetrics, flight_metrics
 from scenarios.reproduction.flights import RATE_HZ, Flight
 
 SETTLED_S = 3.0
@@ -108,7 +108,7 @@ class FlightMeasures:
 @cache
 def _trim_map() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Axes of the database and the two flapping angles of its trims."""
-    from rtsim.aircraft.signals import STATE
+    from rtsim.aircraft.variables import STATE
     from rtsim.lpv.aircraft import load_aircraft
 
     database = load_aircraft().database

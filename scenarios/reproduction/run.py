@@ -14,7 +14,7 @@ from scenarios.reproduction.drawing import save_figures
 from scenarios.reproduction.figures import FIGURES
 from scenarios.reproduction.report import report_html
 from scenarios.reproduction.study import run_study, work_amount
-from telemetry.log_export import write_and_rename
+from telemetry.log.export import write_and_rename
 
 REPORT_NAME, CLAIMS_NAME = "report.html", "claims.json"
 

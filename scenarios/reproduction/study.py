@@ -103,7 +103,7 @@ def run_study(
     advance(1.0)
     evidence = {variant.name: Evidence(flown[variant.name].measures, facts) for variant in variants}
     others = {variant: evidence[variant.name] for variant in variants[1:]}
-    from rtsim.lpv.storage import load_database
+    from rtsim.lpv.files.storage import load_database
 
     return Study(
         flights=base.flights,

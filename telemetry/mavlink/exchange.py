@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from rtsim.command import StickInput
 from rtsim.errors import InputError
-from telemetry.mavlink.shared_memory import WORD, Queue, SequenceLock
-from telemetry.ring import _attach_untracked
+from telemetry.exchange.ring import _attach_untracked
+from telemetry.exchange.shared_memory import WORD, Queue, SequenceLock
 
 _MAGIC = 0x5254_5349_4D4D_4156
 _HEADER_WORDS = 32

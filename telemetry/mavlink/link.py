@@ -16,7 +16,8 @@ import numpy as np
 from rtsim.command import StickInput
 from rtsim.errors import OutputError
 from rtsim.frame import FloatArray
-from telemetry.child_process import child_environment
+from telemetry.exchange.child_process import child_environment
+from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
 from telemetry.mavlink.exchange import (
     ACCEPTED,
@@ -33,7 +34,6 @@ from telemetry.mavlink.exchange import (
     Feedback,
     Request,
 )
-from telemetry.ring import Ring
 
 RING_ROWS = 256
 """Rows kept for the MAVLink process: one second at 250 Hz."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.units import to_deg
+from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.mavlink.exchange import Feedback
-from telemetry.ring import TIMING_COUNT
 
 PILOT_MOCM, PILOT_EXTERNAL, PILOT_HOLD = 0, 1, 2
 """Values of the row's ``pilot_mode``."""

@@ -19,12 +19,12 @@ import traceback
 from collections.abc import Callable
 
 from rtsim.errors import InputError, RtsimError
+from telemetry.exchange.ring import RingReader
 from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import DISCARDED, FAULTS, HEARTBEAT, PORT, READY, STOP, Exchange
 from telemetry.mavlink.framing import LARGEST_DATAGRAM
 from telemetry.mavlink.peers import Address
 from telemetry.mavlink.vehicle import Vehicle
-from telemetry.ring import RingReader
 
 RECEIVE_BUDGET_S = 0.003
 """Longest time spent on incoming datagrams in one turn [s]."""

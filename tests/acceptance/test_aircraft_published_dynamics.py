@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.aircraft import INPUT, OUTPUT, STATE, STATES, Condition, Xv15
+from rtsim.aircraft import INPUT, OUTPUT, STATE, STATES, Condition
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import DEGREE, FOOT, GRAVITY, HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, rpm, to_deg
 
 DATA = tomllib.loads((Path(__file__).parents[1] / "data" / "xv15_validation.toml").read_text())

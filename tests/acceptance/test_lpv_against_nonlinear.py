@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from rtsim.frame import COLUMN
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
-from scenarios.loader import load_scenario
+from scenarios.files.loader import load_scenario
 
 LIMITS = {"airspeed_kt": 0.3, "altitude_m": 0.5, "pitch_deg": 0.4, "flapping_deg": 0.15}
 

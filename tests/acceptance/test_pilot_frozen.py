@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rtsim.analysis.frozen_loop import Condition, frozen_loop, stability_map
+from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
-from rtsim.lpv.storage import load_database
 from rtsim.lpv.tables import prepare_tables
-from rtsim.pilot.frozen import Condition, frozen_loop, stability_map
 from rtsim.pilot.layout_kernels import pilot_state_size
 from rtsim.pilot.pilot_kernels import mocm_advance, mocm_engage, mocm_output
 from rtsim.pilot.schedule import OUTER_LOOPS, OuterLoop

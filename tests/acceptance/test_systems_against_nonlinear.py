@@ -13,8 +13,8 @@ import pytest
 
 from rtsim.command import Command
 from rtsim.frame import COLUMN
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt
 
 LIMITS = {"airspeed_kt": 0.3, "altitude_m": 0.5, "pitch_deg": 0.4, "flapping_deg": 0.15}

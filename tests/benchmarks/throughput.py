@@ -61,8 +61,8 @@ def plant_step_rows(steps: int) -> list[Row]:
 
 def closed_loop_rows() -> list[Row]:
     """The typical conversion: aircraft, MOCM pilot, nacelles, corridor, and a row of every frame."""
-    from rtsim.simulation import FlightSetup, Simulation
-    from scenarios.loader import load_scenario
+    from rtsim.loop.simulation import FlightSetup, Simulation
+    from scenarios.files.loader import load_scenario
 
     programme = load_scenario("typical_conversion").programme
     frames = round(programme.duration * CLOSED_LOOP_HZ)
@@ -138,7 +138,7 @@ def jsbsim_rows(steps: int) -> list[Row]:
 def telemetry_rows(pushes: int) -> list[Row]:
     """What showing a frame costs the loop: a push into the view's ring, which nobody empties (it drops the oldest)."""
     from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS
-    from telemetry.ring import Ring
+    from telemetry.exchange.ring import Ring
 
     ring, row, timing = Ring(), np.zeros(SIGNAL_COUNT), np.zeros(len(TIMING_SIGNALS))
 

@@ -15,12 +15,12 @@ import pytest
 from matplotlib.image import imread
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry import rerun_viewer
-from telemetry.corridor_outline import CorridorOutline
-from telemetry.rerun_colours import GREEN, HIGH_SIDE, LOW_SIDE, SKY
-from telemetry.rerun_view import RerunView
-from telemetry.ring import TIMING_COUNT
-from telemetry.view_options import Layout, ViewOptions
+from telemetry.exchange.ring import TIMING_COUNT
+from telemetry.view import viewer as rerun_viewer
+from telemetry.view.colours import GREEN, HIGH_SIDE, LOW_SIDE, SKY
+from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.view.options import Layout, ViewOptions
+from telemetry.view.view import RerunView
 
 pytestmark = pytest.mark.browser
 

@@ -9,15 +9,15 @@ import pytest
 
 from rtsim.aids import SWITCHES
 from rtsim.aids.aids_kernels import MAP_STICK_FLAPS
-from rtsim.aids.handling import handling
-from rtsim.aircraft.signals import STATE
+from rtsim.aircraft.variables import STATE
+from rtsim.analysis.handling import handling
 from rtsim.command import Command, Sensors
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.sticks.transition import TO_AIRPLANE, transition_schedule
 from rtsim.units import deg, kt
 

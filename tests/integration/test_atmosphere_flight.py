@@ -11,8 +11,8 @@ from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, history_sha256
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt, to_kt
 
 MODERATE = AirSpecification(

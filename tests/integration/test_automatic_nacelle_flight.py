@@ -11,18 +11,18 @@ import pytest
 
 from rtsim.command import Command
 from rtsim.frame import COLUMN
+from rtsim.loop.simulation import FlightSetup, Simulation
+from rtsim.measures.figures import figures_of_rows
 from rtsim.nacelle.automatic import AutomaticNacelle, ScheduledNacelle, centre_line_schedule
 from rtsim.optimization.batch import BatchFlyer
-from rtsim.optimization.figures import figures_of_rows
 from rtsim.optimization.paths import table_1
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt
-from scenarios.flight_setup import flight_setup, setup_from_json, setup_to_json
-from scenarios.loader import load_scenario
-from scenarios.options import Overrides
-from scenarios.replay import fly_recording, replay_log
-from scenarios.runner import FlightOutputs, fly
+from scenarios.files.loader import load_scenario
+from scenarios.files.options import Overrides
+from scenarios.flight.flight_setup import flight_setup, setup_from_json, setup_to_json
+from scenarios.flight.replay import fly_recording, replay_log
+from scenarios.flight.runner import FlightOutputs, fly
 
 ALTITUDE = 100.0
 

@@ -10,20 +10,20 @@ import pytest
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
-from rtsim.optimization.batch import BatchFlight, BatchFlyer
-from rtsim.optimization.figures import (
+from rtsim.loop.simulation import FlightSetup, Simulation
+from rtsim.measures.figures import (
     OBJECTIVES,
     deviation_from_sums,
     figures_from_sums,
     figures_of_rows,
     objective_value,
 )
-from rtsim.optimization.merit_kernels import MERIT_SIZE
+from rtsim.measures.merit_kernels import MERIT_SIZE
+from rtsim.measures.metrics import flight_metrics
+from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.paths import PATH_NAMES, paper_path
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt
-from scenarios.metrics import flight_metrics
 
 PROGRAMMES = [paper_path(name, nacelle_rate_deg_s=8.0).programme() for name in PATH_NAMES]
 ROUGH = {"pilot_noise": True, "air": AirSpecification(turbulence=Turbulence.of_severity("moderate"))}

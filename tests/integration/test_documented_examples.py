@@ -13,7 +13,7 @@ import scenarios
 from rtsim.cli.main import run
 from rtsim.errors import InputError
 from rtsim.realtime.control import checked_speed
-from scenarios.options import Overrides
+from scenarios.files.options import Overrides
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 

@@ -8,9 +8,9 @@ import pytest
 from rtsim.faults import Fault, FaultSwitch
 from rtsim.faults import fault_kernels as kernels
 from rtsim.frame import COLUMN, history_sha256
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
 from rtsim.realtime import FlightControl
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import HORSEPOWER, deg, kt
 
 PLANTS = ["lpv", "nonlinear"]
@@ -173,9 +173,9 @@ def test_scenario_to_log_to_replay(tmp_path):
     """A file with air and failures, live ones on top: events recorded, the log replays to the same hash."""
     from rtsim.atmosphere import Gust, Turbulence
     from scenarios import fly
-    from scenarios.loader import parse_scenario
-    from scenarios.replay import replay_log
-    from scenarios.runner import FlightOutputs
+    from scenarios.files.loader import parse_scenario
+    from scenarios.flight.replay import replay_log
+    from scenarios.flight.runner import FlightOutputs
 
     scenario, problems = parse_scenario(SCENARIO, file="rough.toml")
     assert problems == []
@@ -222,7 +222,7 @@ def test_scenario_to_log_to_replay(tmp_path):
     ],
 )
 def test_mistakes_in_air_and_failures_name_key_value_and_mend(old, new, words):
-    from scenarios.loader import parse_scenario
+    from scenarios.files.loader import parse_scenario
 
     assert old in SCENARIO
     scenario, problems = parse_scenario(SCENARIO.replace(old, new, 1), file="rough.toml")
@@ -238,7 +238,7 @@ def test_reading_a_scenario_with_failures_loads_no_compiled_code():
     import sys
 
     code = (
-        "import sys\nfrom scenarios.loader import parse_scenario\n"
+        "import sys\nfrom scenarios.files.loader import parse_scenario\n"
         f"scenario, problems = parse_scenario({SCENARIO!r}, file='x')\n"
         "assert scenario is not None and len(scenario.faults) == 2, problems\nassert 'numba' not in sys.modules\n"
     )

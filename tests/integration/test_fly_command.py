@@ -18,8 +18,8 @@ import pytest
 from rtsim.cli.fly import parse_speed
 from rtsim.cli.main import run
 from rtsim.errors import InputError
-from scenarios.replay import replay_log
-from telemetry.log_reader import read_log
+from scenarios.flight.replay import replay_log
+from telemetry.log.reader import read_log
 
 KEYS = {
     "scenario": None, "pilot": None, "plant": None, "protection": None, "corridor_name": None, "rate_hz": None,

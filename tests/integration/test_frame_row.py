@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rtsim.aircraft.signals import STATE
+from rtsim.aircraft.variables import STATE
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.frame import COLUMN
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt, to_kt
 
 WIND = 4.0

@@ -14,9 +14,9 @@ import time
 import numpy as np
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.child_process import child_environment
+from telemetry.exchange.child_process import child_environment
+from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.mavlink import Endpoint, Feedback, MavlinkConfig, MavlinkLink
-from telemetry.ring import TIMING_COUNT
 
 
 def run(*options, **settings):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rtsim.frame import COLUMN
-from scenarios import verdict
-from scenarios.loader import library_names, load_scenario
+from scenarios.files.loader import library_names, load_scenario
+from scenarios.verdicts import tester as verdict
 
 TRIALS = [name for name in library_names() if name.startswith("ep")]
 MISUSE = [name for name in TRIALS if load_scenario(name).trial.kind != "nominal"]

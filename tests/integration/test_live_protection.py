@@ -16,11 +16,11 @@ import scenarios
 from rtsim.cli.main import run
 from rtsim.protection import MarginMonitor
 from rtsim.realtime import FlightControl
-from scenarios.limit_watch import LimitWatch
-from scenarios.options import Overrides
-from scenarios.replay import replay_log
-from scenarios.runner import FlightOutputs
-from telemetry.child_process import child_environment
+from scenarios.files.options import Overrides
+from scenarios.flight.limit_watch import LimitWatch
+from scenarios.flight.replay import replay_log
+from scenarios.flight.runner import FlightOutputs
+from telemetry.exchange.child_process import child_environment
 
 LAWS = """
 import time
@@ -210,7 +210,7 @@ def test_the_law_of_the_documentation_flies(tmp_path: Path, monkeypatch: pytest.
 
 def test_the_limit_watch_compiles_nothing_once_rows_come() -> None:
     """Its kernels are ready before the flight begins, also the first time they are ever used."""
-    fresh = "from scenarios.limit_watch import LimitWatch, watch; import numpy as np; "
+    fresh = "from scenarios.flight.limit_watch import LimitWatch, watch; import numpy as np; "
     fresh += "from rtsim.frame import SIGNAL_COUNT; w = LimitWatch('design', print, dt=0.004); "
     fresh += "before = list(watch.signatures); w.rows(np.zeros((10, SIGNAL_COUNT))); "
     fresh += "assert before and list(watch.signatures) == before"

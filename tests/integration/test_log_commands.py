@@ -12,8 +12,8 @@ import pytest
 from rtsim.cli.main import run as run_command
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED
 from rtsim.frame import COLUMN, SIGNAL_COUNT, history_sha256
-from telemetry.log_format import FlightMetadata, LogEvent
-from telemetry.recorder import Recorder
+from telemetry.log.format import FlightMetadata, LogEvent
+from telemetry.log.recorder import Recorder
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:

@@ -13,9 +13,9 @@ from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.errors import InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.mavlink import Endpoint, Feedback, MavlinkConfig, MavlinkLink
 from telemetry.mavlink.framing import signature_time
-from telemetry.ring import TIMING_COUNT
 
 
 class Ground:
@@ -168,7 +168,7 @@ def test_the_vehicle_ends_when_the_flight_is_gone(ground):
     import subprocess
     import sys
 
-    from telemetry.child_process import child_environment
+    from telemetry.exchange.child_process import child_environment
 
     code = (
         "import sys, time\n"

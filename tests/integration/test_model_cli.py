@@ -14,7 +14,7 @@ import pytest
 
 from rtsim.cli.main import run
 from rtsim.lpv.database import GRIDDED
-from rtsim.lpv.storage import load_database, save_database
+from rtsim.lpv.files.storage import load_database, save_database
 
 TRIM_KEYS = {
     "airspeed_kt", "nacelle_deg", "flap_deg", "rotor_rpm", "pitch_deg", "stick_in", "elevator_deg", "cyclic_deg",

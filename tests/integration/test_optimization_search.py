@@ -7,17 +7,17 @@ import dataclasses
 import numpy as np
 import pytest
 
+from rtsim.analysis.path_stability import path_stability
 from rtsim.errors import InputError
-from rtsim.optimization.figures import figures_of_rows, objective_value
+from rtsim.loop.simulation import Simulation
+from rtsim.measures.figures import figures_of_rows, objective_value
 from rtsim.optimization.paths import fast_side, paper_path, table_1
 from rtsim.optimization.problem import CONSTRAINTS, ConversionProblem
 from rtsim.optimization.report import baseline_summary, best_path, nonlinear_check, scenario_text
 from rtsim.optimization.search import run_search, start_vectors
 from rtsim.optimization.spec import checked_spec, spec_like
-from rtsim.optimization.stability import path_stability
-from rtsim.simulation import Simulation
-from scenarios.loader import load_scenario, parse_scenario
-from scenarios.runner import fly
+from scenarios.files.loader import load_scenario, parse_scenario
+from scenarios.flight.runner import fly
 
 SMALL = {"generations": 4, "population": 8}
 

@@ -10,11 +10,11 @@ import pytest
 
 import scenarios
 from rtsim.cli.main import run
-from rtsim.lpv.storage import load_database, save_database
-from scenarios.loader import load_scenario
-from scenarios.options import Overrides
-from scenarios.replay import replay_log
-from scenarios.runner import FlightOutputs
+from rtsim.lpv.files.storage import load_database, save_database
+from scenarios.files.loader import load_scenario
+from scenarios.files.options import Overrides
+from scenarios.flight.replay import replay_log
+from scenarios.flight.runner import FlightOutputs
 
 
 @pytest.fixture(scope="module")

@@ -16,9 +16,9 @@ from rtsim.cli.main import run
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.realtime import FlightControl
-from scenarios.options import Overrides
-from scenarios.replay import first_difference, replay_log
-from scenarios.runner import FlightOutputs
+from scenarios.files.options import Overrides
+from scenarios.flight.replay import first_difference, replay_log
+from scenarios.flight.runner import FlightOutputs
 
 OWN_PILOT = """
 import math

@@ -20,11 +20,11 @@ import rerun as rr
 
 from rtsim.errors import EXIT_OUTPUT_FAILED, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.child_process import child_environment
-from telemetry.corridor_outline import CorridorOutline
-from telemetry.rerun_view import RerunView
-from telemetry.ring import TIMING_COUNT
-from telemetry.view_options import ViewOptions, display_available, partial_name
+from telemetry.exchange.child_process import child_environment
+from telemetry.exchange.ring import TIMING_COUNT
+from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.view.options import ViewOptions, display_available, partial_name
+from telemetry.view.view import RerunView
 
 OUTLINE = CorridorOutline.from_lines(
     "design",
@@ -286,8 +286,8 @@ def test_the_view_finishes_its_file_and_ends_when_the_flight_is_killed(tmp_path:
     script = (
         "import sys, time\n"
         "from pathlib import Path\n"
-        "from telemetry.rerun_view import RerunView\n"
-        "from telemetry.view_options import ViewOptions\n"
+        "from telemetry.view.view import RerunView\n"
+        "from telemetry.view.options import ViewOptions\n"
         "view = RerunView(ViewOptions(viewer=False, record=Path(sys.argv[1])))\n"
         "assert view.wait_ready(30.0)\n"
         "print(view._process.pid, flush=True)\n"

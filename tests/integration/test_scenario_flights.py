@@ -17,9 +17,9 @@ from rtsim.errors import InputError
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.realtime import FlightControl
 from rtsim.units import deg, kt
-from scenarios.options import Overrides, chosen_scenario
-from scenarios.record import FlightRecord
-from scenarios.runner import FlightOutputs
+from scenarios.files.options import Overrides, chosen_scenario
+from scenarios.flight.result import FlightRecord
+from scenarios.flight.runner import FlightOutputs
 
 
 def fast(

@@ -10,9 +10,9 @@ import pytest
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, history_sha256
+from rtsim.loop.data import SimulationState
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup, Simulation
-from rtsim.simulation_data import SimulationState
 from rtsim.units import deg, kt
 
 

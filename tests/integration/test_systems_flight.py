@@ -16,20 +16,20 @@ from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.frame import COLUMN, FloatArray, history_sha256
+from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.database import Database
-from rtsim.lpv.storage import load_database, save_database
+from rtsim.lpv.files.storage import load_database, save_database
 from rtsim.lpv.variables import AUXILIARY_INPUTS
 from rtsim.programme import Programme
 from rtsim.realtime import FlightControl
 from rtsim.realtime.keys import press
-from rtsim.simulation import FlightSetup, Simulation
 from rtsim.units import deg, kt
 from scenarios.campaign.trial import Bench
-from scenarios.loader import load_scenario
-from scenarios.options import Overrides
-from scenarios.replay import replay_log
-from scenarios.runner import FlightOutputs
-from scenarios.verdict import plan_of
+from scenarios.files.loader import load_scenario
+from scenarios.files.options import Overrides
+from scenarios.flight.replay import replay_log
+from scenarios.flight.runner import FlightOutputs
+from scenarios.verdicts.tester import plan_of
 from telemetry.mavlink.notices import TEXT_LENGTH
 
 PLANTS = ["lpv", "lpv-plain", "nonlinear"]

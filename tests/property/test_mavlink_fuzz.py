@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN
+from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import Exchange
 from telemetry.mavlink.vehicle import Vehicle
-from telemetry.ring import ROW_WIDTH
 
 GROUND = ("127.0.0.1", 14550)
 AIDS = {"rate_damping": True, "attitude_retention": True, "altitude_hold": False, "airspeed_hold": False}

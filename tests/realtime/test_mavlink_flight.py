@@ -20,9 +20,9 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN
-from scenarios.replay import replay_log
-from telemetry.child_process import child_environment
-from telemetry.log_reader import read_log
+from scenarios.flight.replay import replay_log
+from telemetry.exchange.child_process import child_environment
+from telemetry.log.reader import read_log
 
 pytestmark = pytest.mark.realtime
 

@@ -8,9 +8,9 @@ import pytest
 
 import scenarios
 from rtsim.frame import TIMING_SIGNALS
-from scenarios.options import Overrides
-from scenarios.runner import FlightOutputs
-from telemetry.log_reader import read_log
+from scenarios.files.options import Overrides
+from scenarios.flight.runner import FlightOutputs
+from telemetry.log.reader import read_log
 
 RUNS = 3
 

@@ -36,7 +36,7 @@ PILOT = "tests.regression.law_in_python:Steady"
 def _flights() -> Iterator[tuple[str, Any]]:
     """Whole flights of scenarios: name, and the frames."""
     import scenarios
-    from scenarios.options import Overrides
+    from scenarios.files.options import Overrides
 
     def fly(name: str, **changes: Any) -> Any:
         return scenarios.fly(name, speed="max", overrides=Overrides(**changes))
@@ -90,8 +90,7 @@ def _search() -> Iterator[tuple[str, str]]:
         ("plain", {}),
         ("robust", {"robust.flights": 2, "robust.turbulence": "light", "robust.pilot_noise": True}),
     ):
-        changes = {"search.population": 8, **changes}
-        problem = ConversionProblem(checked_spec(SearchSpec().model_dump(), changes))
+        problem = ConversionProblem(checked_spec(SearchSpec().model_dump(), {"search.population": 8, **changes}))
         candidates = np.random.default_rng(5).random((8, problem.variables))
         found = problem.evaluate(candidates)
         digest = hashlib.sha256()

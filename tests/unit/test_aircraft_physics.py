@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.aircraft import INPUT, INPUTS, OUTPUT, STATE, STATES, Condition, Xv15, tail_kernels
-from rtsim.aircraft import airframe_kernels as airframe
-from rtsim.aircraft import dynamics_kernels as kernels
+from rtsim.aircraft import INPUT, INPUTS, OUTPUT, STATE, STATES, Condition
 from rtsim.aircraft.atmosphere import standard_atmosphere
-from rtsim.aircraft.data_reader import read_data
 from rtsim.aircraft.table_kernels import curve, surface
+from rtsim.aircraft.xv15 import airframe_kernels as airframe
+from rtsim.aircraft.xv15 import dynamics_kernels as kernels
+from rtsim.aircraft.xv15.data_reader import read_data
+from rtsim.aircraft.xv15.model import Xv15, tail_kernels
 from rtsim.units import DEGREE, FOOT, GRAVITY, INCH, SLUG_FOOT_SQUARED, deg, kt, to_deg
 
 AIRCRAFT = Xv15.load()

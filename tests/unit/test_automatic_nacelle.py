@@ -24,8 +24,8 @@ from rtsim.nacelle.automatic import (
 from rtsim.optimization.paths import table_1
 from rtsim.programme import Programme
 from rtsim.units import deg, kt, to_deg, to_kt
-from scenarios.loader import parse_scenario
-from scenarios.nacelle_laws import NACELLE_PLUGIN, NacelleLawGuard, automatic_nacelle, load_nacelle_law
+from scenarios.files.loader import parse_scenario
+from scenarios.files.nacelle_laws import NACELLE_PLUGIN, NacelleLawGuard, automatic_nacelle, load_nacelle_law
 
 DT = 0.004
 LINE = NacelleSchedule((kt(40.0), kt(140.0)), (deg(90.0), 0.0))

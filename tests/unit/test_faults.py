@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from rtsim.aircraft import INPUT, OUTPUT, OUTPUTS, STATE, STATES, Condition, Xv15
-from rtsim.aircraft import dynamics_kernels as nonlinear
+from rtsim.aircraft import INPUT, OUTPUT, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError
 from rtsim.faults import Fault, FaultEvent, fault_events
 from rtsim.faults import fault_kernels as kernels

@@ -15,21 +15,17 @@ LAYERS = (
     ("rtsim.errors",),
     ("rtsim.frame",),
     ("rtsim.command",),
-    ("rtsim.kernel_cache", "rtsim.random_streams", "rtsim.plugins"),
-    ("rtsim.compiled",),
-    ("rtsim.ramp_filter_kernels",),
+    ("rtsim.random_streams", "rtsim.plugins"),
+    ("rtsim.kernels",),
     ("rtsim.aircraft", "rtsim.corridor", "rtsim.programme", "rtsim.atmosphere", "telemetry"),
     ("rtsim.lpv",),
     ("rtsim.nacelle",),
     ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),
     ("rtsim.systems",),
-    ("rtsim.plant_kernels",),
-    ("rtsim.simulation_data",),
-    ("rtsim.observation_kernels",),
-    ("rtsim.simulation_kernels",),
-    ("rtsim.simulation_setup",),
-    ("rtsim.simulation",),
-    ("rtsim.realtime", "rtsim.optimization"),
+    ("rtsim.loop",),
+    ("rtsim.measures", "rtsim.realtime"),
+    ("rtsim.optimization",),
+    ("rtsim.analysis",),
     ("scenarios",),
     ("rtsim.cli", "rtsim.__main__"),
 )
@@ -107,7 +103,9 @@ def test_a_backward_arrow_would_be_found(tmp_path, monkeypatch):
     monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
     wrong = tmp_path / "rtsim" / "corridor" / "wrong.py"
     wrong.parent.mkdir(parents=True)
-    wrong.write_text("from rtsim import lpv\n\ndef f():\n    import telemetry.ring\n    from ..pilot import x\n")
+    wrong.write_text(
+        "from rtsim import lpv\n\ndef f():\n    import telemetry.exchange.ring\n    from ..pilot import x\n"
+    )
     faults = backward_arrows(wrong)
     assert len(faults) == 3
     sideways = tmp_path / "telemetry" / "wrong.py"

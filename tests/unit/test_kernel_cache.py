@@ -11,20 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from rtsim import kernel_cache
+from rtsim.kernels import cache as kernel_cache
 
 ROOT = Path(__file__).resolve().parents[2]
+SOURCES = kernel_cache.kernel_sources(ROOT)
 
 
 @pytest.fixture
 def sources(tmp_path):
     """A copy of what the hash reads."""
-    kernels = [path for package in ("rtsim", "scenarios") for path in (ROOT / package).rglob("*_kernels.py")]
-    for path in [*kernels, *(ROOT / name for name in kernel_cache.CONSTANTS)]:
+    for path in kernel_cache.kernel_sources(ROOT):
         target = tmp_path / "sources" / path.relative_to(ROOT)
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, target)
-    (tmp_path / "sources" / "scenarios").mkdir(exist_ok=True)
     return tmp_path / "sources"
 
 
@@ -42,18 +41,16 @@ def test_an_edit_of_any_kernel_or_constant_changes_the_folder(sources):
 
 def test_all_that_kernels_import_is_part_of_the_hash():
     """Names that kernels take from modules of their own project would otherwise be compiled in unnoticed."""
+    found = {path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".") for path in SOURCES}
     missing = set()
-    for path in [*(ROOT / "rtsim").rglob("*_kernels.py"), *(ROOT / "scenarios").rglob("*_kernels.py")]:
+    for path in SOURCES:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.ImportFrom) or not (node.module or "").startswith(("rtsim", "scenarios")):
                 continue
-            file = f"{node.module.replace('.', '/')}.py"
-            if (ROOT / file).is_file():  # a package hands out its modules, which are kernels or named
-                missing |= {file} if not file.endswith("_kernels.py") else set()
-            else:
-                modules = [f"{node.module.replace('.', '/')}/{alias.name}.py" for alias in node.names]
-                missing |= {file for file in modules if not file.endswith("_kernels.py")}
-    assert missing <= set(kernel_cache.CONSTANTS)
+            names = {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+            modules = {name for name in names if (ROOT / f"{name.replace('.', '/')}.py").is_file()}
+            missing |= modules - found
+    assert not missing
 
 
 def test_the_folder_is_made_and_old_ones_are_forgotten(sources, tmp_path, monkeypatch):

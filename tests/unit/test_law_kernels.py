@@ -10,7 +10,7 @@ import pytest
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.aircraft import load_aircraft
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.protection import LAW_NAMES, law_tables
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels as kernels

@@ -13,10 +13,10 @@ from scipy.io import loadmat
 
 from rtsim.errors import InputError, OutputError
 from rtsim.frame import SIGNAL_COUNT
-from telemetry.log_export import export_log
-from telemetry.log_format import HEADER_PART, FlightMetadata, LogEvent
-from telemetry.log_reader import FlightLog, read_log
-from telemetry.recorder import Recorder
+from telemetry.log.export import export_log
+from telemetry.log.format import HEADER_PART, FlightMetadata, LogEvent
+from telemetry.log.reader import FlightLog, read_log
+from telemetry.log.recorder import Recorder
 
 METADATA = FlightMetadata("hover", "", "hash", 0, 50.0, versions={"rtsim": "0.1.0"})
 

@@ -13,17 +13,17 @@ from rtsim.aids import AIDS, SWITCHES
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
+from rtsim.loop.simulation import Simulation
 from rtsim.realtime import Executive, FlightControl
-from rtsim.simulation import Simulation
 from rtsim.units import to_deg
-from scenarios.flight_setup import flight_setup
-from scenarios.hands import Hands
-from scenarios.loader import load_scenario
-from scenarios.mavlink_options import MavlinkOptions, mavlink_config
-from scenarios.options import Overrides, with_overrides
-from scenarios.scenario import AidName
-from scenarios.session import FlightSession
-from scenarios.sinks import FlightSinks
+from scenarios.files.loader import load_scenario
+from scenarios.files.options import Overrides, with_overrides
+from scenarios.files.scenario import AidName
+from scenarios.flight.flight_setup import flight_setup
+from scenarios.flight.hands import Hands
+from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config
+from scenarios.flight.session import FlightSession
+from scenarios.flight.sinks import FlightSinks
 from telemetry.mavlink import Request
 from telemetry.mavlink.parameters import AID_PARAMETERS
 

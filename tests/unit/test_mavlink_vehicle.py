@@ -10,11 +10,11 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import Exchange, Feedback, Request
 from telemetry.mavlink.peers import MOST_PEERS
 from telemetry.mavlink.vehicle import Vehicle
-from telemetry.ring import ROW_WIDTH
 
 GROUND = ("127.0.0.1", 14550)
 OTHER = ("127.0.0.1", 14999)

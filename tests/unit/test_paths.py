@@ -21,7 +21,7 @@ from rtsim.optimization.paths import (
     trim_flapping_map,
 )
 from rtsim.units import deg, kt, to_kt
-from scenarios.loader import parse_scenario
+from scenarios.files.loader import parse_scenario
 
 
 def test_table_1_has_the_printed_times():

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtsim.lpv.database import Database
+from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
-from rtsim.lpv.storage import load_database
 from rtsim.lpv.tables import prepare_tables
 from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.layout_kernels import OFFSETS, S_ESTIMATE, S_LIMITED, noise_width, pilot_state_size

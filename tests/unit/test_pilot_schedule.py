@@ -9,7 +9,7 @@ import pytest
 
 from rtsim.errors import InputError
 from rtsim.lpv.database import GRIDDED, Database
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.pilot.design import design_problem
 from rtsim.pilot.design_plant import CONTROLS, GUSTS, design_plant, plant_layout
 from rtsim.pilot.response import frequency_response

@@ -13,14 +13,14 @@ from matplotlib.image import imread
 
 from rtsim.errors import InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
-from telemetry import flight_plots
-from telemetry.corridor_outline import CorridorOutline
-from telemetry.flight_plots import plot_flight
-from telemetry.log_format import FlightMetadata
-from telemetry.log_reader import FlightLog, read_log
-from telemetry.recorder import Recorder
-from telemetry.ring import TIMING_COUNT
-from telemetry.signal_groups import label
+from telemetry.exchange.ring import TIMING_COUNT
+from telemetry.log import flight_plots
+from telemetry.log.flight_plots import plot_flight
+from telemetry.log.format import FlightMetadata
+from telemetry.log.reader import FlightLog, read_log
+from telemetry.log.recorder import Recorder
+from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.view.signal_groups import label
 
 OUTLINE = CorridorOutline.from_lines("design", low=([90.0, 0.0], [0.0, 101.0]), high=([90.0, 0.0], [125.0, 170.0]))
 

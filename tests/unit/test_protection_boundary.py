@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.aircraft import OUTPUT, STATE, Condition, Xv15
+from rtsim.aircraft import OUTPUT, STATE, Condition
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.protection import BOUNDARY_NAMES, check_consistency, load_boundary
 from rtsim.protection.boundary import MODEL_PITCH, guarded_corridor, model_corridor, trim_range
 from rtsim.protection.limits import load_limits

@@ -8,13 +8,13 @@ from scipy.linalg import solve_continuous_are
 from scipy.signal import cont2discrete
 
 from rtsim.corridor import load_corridor
+from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.lpv.aircraft import load_aircraft
-from rtsim.lpv.storage import load_database
+from rtsim.lpv.files.storage import load_database
 from rtsim.protection import prediction_kernels as kernels
 from rtsim.protection.limits import load_weights
 from rtsim.protection.model import reduce_model
 from rtsim.protection.tables import sample_boundary
-from rtsim.ramp_filter_kernels import critically_damped_ramp
 from rtsim.units import GRAVITY, deg, kt
 
 SLOW = ("u", "w", "q", "pitch")

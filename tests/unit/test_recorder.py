@@ -21,13 +21,13 @@ from hypothesis import strategies as st
 
 from rtsim.errors import EXIT_OUTPUT_FAILED, InputError, OutputError
 from rtsim.frame import SIGNAL_COUNT, SIGNALS, history_sha256
-from telemetry import recorder_worker
-from telemetry.child_process import child_environment
-from telemetry.corridor_outline import CorridorOutline
-from telemetry.log_format import HEADER_PART, LOG_NAMES, FlightMetadata, LogEvent
-from telemetry.log_reader import read_log
-from telemetry.recorder import Recorder
-from telemetry.ring import ROW_WIDTH, TIMING_COUNT
+from telemetry.exchange.child_process import child_environment
+from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT
+from telemetry.log import recorder_worker
+from telemetry.log.format import HEADER_PART, LOG_NAMES, FlightMetadata, LogEvent
+from telemetry.log.reader import read_log
+from telemetry.log.recorder import Recorder
+from telemetry.view.corridor_outline import CorridorOutline
 
 OUTLINE = CorridorOutline.from_lines("design", low=([90.0, 0.0], [0.0, 101.0]), high=([90.0, 0.0], [125.0, 170.0]))
 METADATA = FlightMetadata(
@@ -139,8 +139,8 @@ def test_kill_9_in_flight_loses_at_most_a_second(tmp_path: Path) -> None:
     path = tmp_path / "flight.parquet"
     script = (
         "import os, sys, time, numpy as np\n"
-        "from telemetry.log_format import FlightMetadata\n"
-        "from telemetry.recorder import Recorder\n"
+        "from telemetry.log.format import FlightMetadata\n"
+        "from telemetry.log.recorder import Recorder\n"
         "from rtsim.frame import SIGNAL_COUNT\n"
         "recorder = Recorder(sys.argv[1], FlightMetadata('x', '', 'h', 0, 250.0), live=True)\n"
         "row = np.zeros(SIGNAL_COUNT)\n"

@@ -91,8 +91,8 @@ def test_oscillation_is_what_is_added_to_the_trim(flight):
 
 
 def test_a_flight_is_the_simulators_own(flight):
-    from rtsim.simulation import Simulation
-    from rtsim.simulation_setup import FlightSetup
+    from rtsim.loop.setup import FlightSetup
+    from rtsim.loop.simulation import Simulation
 
     frames = Simulation(FlightSetup(programme=flight.programme)).run(2500)
     assert np.array_equal(frames, flight.rows[:2500], equal_nan=True)

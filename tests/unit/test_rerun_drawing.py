@@ -7,13 +7,13 @@ import pytest
 import rerun as rr
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT, SIGNAL_NAMES
-from telemetry import rerun_airframe as airframe
-from telemetry import rerun_corridor
-from telemetry.log_format import LOG_NAMES, LOG_SIGNALS
-from telemetry.rerun_blueprint import blueprint
-from telemetry.rerun_plots import ACTING_NAMES, PILOT_PLOTS, acting_on
-from telemetry.rerun_strokes import LineArt, text_width
-from telemetry.signal_groups import FLAGS, label, plot_groups, plot_path
+from telemetry.log.format import LOG_NAMES, LOG_SIGNALS
+from telemetry.view import airframe
+from telemetry.view import corridor as rerun_corridor
+from telemetry.view.blueprint import blueprint
+from telemetry.view.plots import ACTING_NAMES, PILOT_PLOTS, acting_on
+from telemetry.view.signal_groups import FLAGS, label, plot_groups, plot_path
+from telemetry.view.strokes import LineArt, text_width
 
 PARTS = {
     "fuselage": airframe.fuselage(),

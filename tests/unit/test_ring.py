@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_COUNT
-from telemetry.child_process import child_environment
-from telemetry.ring import ROW_WIDTH, TIMING_COUNT, Ring, RingReader
+from telemetry.exchange.child_process import child_environment
+from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT, Ring, RingReader
 
 CAPACITY = 8
 
@@ -59,7 +59,7 @@ def test_rows_keep_order_and_every_row_is_read_or_counted(actions: list[str | in
 def test_rows_from_a_fast_writer_in_another_process_are_whole_and_in_order() -> None:
     script = (
         "import sys, numpy as np\n"
-        "from telemetry.ring import Ring, SIGNAL_COUNT, TIMING_COUNT\n"
+        "from telemetry.exchange.ring import Ring, SIGNAL_COUNT, TIMING_COUNT\n"
         "ring = Ring(16)\n"
         "print(ring.name, flush=True)\n"
         "row, timing = np.empty(SIGNAL_COUNT), np.empty(TIMING_COUNT)\n"
@@ -101,7 +101,7 @@ def test_rows_from_a_fast_writer_in_another_process_are_whole_and_in_order() -> 
 
 
 def test_nothing_is_left_behind_without_close(tmp_path: Path) -> None:
-    script = "from telemetry.ring import Ring\nprint(Ring(8).name)\nring = Ring(8)\nprint(ring.name)\n"
+    script = "from telemetry.exchange.ring import Ring\nprint(Ring(8).name)\nring = Ring(8)\nprint(ring.name)\n"
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", script],
         env=child_environment(),
@@ -117,9 +117,13 @@ def test_nothing_is_left_behind_without_close(tmp_path: Path) -> None:
 
 
 def test_a_killed_writer_leaves_no_memory_behind() -> None:
-    script = (
-        "import time\nfrom telemetry.ring import Ring\nring = Ring(8)\nprint(ring.name, flush=True)\ntime.sleep(60)\n"
+    lines = (
+        "import time",
+        "from telemetry.exchange.ring import Ring",
+        "ring = Ring(8)",
+        "print(ring.name, flush=True)",
     )
+    script = "\n".join((*lines, "print(ring.name, flush=True)", "time.sleep(60)"))
     with subprocess.Popen(
         [sys.executable, "-c", script],
         stdout=subprocess.PIPE,
@@ -140,7 +144,8 @@ def test_a_killed_writer_leaves_no_memory_behind() -> None:
 
 def test_a_reader_that_ends_leaves_the_ring_to_its_owner() -> None:
     ring = Ring(8)
-    script = f"from telemetry.ring import RingReader\nreader = RingReader({ring.name!r})\nprint(len(reader.read()))\n"
+    imported = "from telemetry.exchange.ring import RingReader"
+    script = f"{imported}\nreader = RingReader({ring.name!r})\nprint(len(reader.read()))\n"
     push_numbered(ring, 1)
     result = subprocess.run(
         [sys.executable, "-W", "error", "-c", script],

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from rtsim.aircraft import STATE, Condition, Xv15
-from rtsim.aircraft import rotor_kernels as kernels
-from rtsim.aircraft.data_reader import read_data
-from rtsim.aircraft.rotor_reader import read_rotor
+from rtsim.aircraft import STATE, Condition
+from rtsim.aircraft.xv15 import rotor_kernels as kernels
+from rtsim.aircraft.xv15.data_reader import read_data
+from rtsim.aircraft.xv15.model import Xv15
+from rtsim.aircraft.xv15.rotor_reader import read_rotor
 from rtsim.units import GRAVITY, deg, kt
 
 AIRCRAFT = Xv15.load()

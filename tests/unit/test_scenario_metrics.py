@@ -9,9 +9,9 @@ import pytest
 import scipy.signal
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.measures.metrics import METRIC_NAMES, exceedance_events, flight_metrics, metric_unit, nacelle_reference_deg
 from rtsim.programme import Programme
 from rtsim.units import deg
-from scenarios.metrics import METRIC_NAMES, exceedance_events, flight_metrics, metric_unit, nacelle_reference_deg
 
 DT = 0.004
 HOLD = Programme.hold(airspeed=0.0, nacelle_angle=deg(90.0), altitude=100.0)

@@ -9,11 +9,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtsim.loop.simulation import FlightSetup
 from rtsim.programme import Programme
-from rtsim.simulation import FlightSetup
-from scenarios.flight_setup import corridor_outline, flight_frames, flight_setup, setup_from_json, setup_to_json
-from scenarios.loader import library_names, load_scenario
-from scenarios.options import Overrides, with_overrides
+from scenarios.files.loader import library_names, load_scenario
+from scenarios.files.options import Overrides, with_overrides
+from scenarios.flight.flight_setup import corridor_outline, flight_frames, flight_setup, setup_from_json, setup_to_json
 
 
 def through_json(setup: FlightSetup) -> FlightSetup:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtsim.aircraft import INPUT, INPUTS, Xv15
-from rtsim.aircraft.signals import FLAP_INPUTS
+from rtsim.aircraft import INPUT, INPUTS
+from rtsim.aircraft.variables import FLAP_INPUTS
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.systems import drive_kernels as drive
 from rtsim.systems import flap_kernels as flap
 from rtsim.systems import load_drive_tables, load_flap_tables

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtsim.aircraft import OUTPUT, STATE, STATES, Condition, Xv15
+from rtsim.aircraft import OUTPUT, STATE, STATES, Condition
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import GRAVITY, POUND, deg, kt, rpm, to_deg
 
 AIRCRAFT = Xv15.load()

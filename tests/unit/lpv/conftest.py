@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from rtsim.aircraft.signals import Variable
-from rtsim.lpv.build import GridPoint, build_database
-from rtsim.lpv.grid import Grid
+from rtsim.aircraft.variables import Variable
+from rtsim.lpv.building.build import GridPoint, build_database
+from rtsim.lpv.building.grid import Grid
 from rtsim.units import GRAVITY
 
 STATES = ("collective", "pitch", "u", "w", "q", "altitude", "disc", "elevator")

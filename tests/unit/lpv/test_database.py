@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.io import loadmat, savemat
 
-from rtsim.aircraft.signals import Variable
+from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError, OutputError
 from rtsim.lpv.database import GRIDDED, PilotArrays, fill_invalid, quantized, round_mantissa
-from rtsim.lpv.storage import load_database, save_database
+from rtsim.lpv.files.storage import load_database, save_database
 
 PILOT = PilotArrays(
     {"gain": np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)}, {"delay": 0.15, "note": "made up", "order": 2}
@@ -163,7 +163,7 @@ def test_failed_write_leaves_the_old_file(toy_database, tmp_path, suffix, monkey
     def full_disk(*_args, **_options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("rtsim.lpv.database_file._write", full_disk)
+    monkeypatch.setattr("rtsim.lpv.files.netcdf._write", full_disk)
     monkeypatch.setattr("scipy.io.savemat", full_disk)
     with pytest.raises(OutputError, match="No space left"):
         save_database(toy_database, path)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 import rtsim
-from rtsim.aircraft import Condition, Xv15
+from rtsim.aircraft import Condition
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError, TrimError
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
-from rtsim.lpv.storage import save_database
+from rtsim.lpv.files.storage import save_database
 from rtsim.units import deg, kt
 
 
@@ -209,7 +210,7 @@ def test_kinematics_of_another_convention_are_refused_by_name(toy_database):
 def test_missing_states_are_named(toy_database):
     from dataclasses import replace
 
-    from rtsim.aircraft.signals import Variable
+    from rtsim.aircraft.variables import Variable
 
     states = tuple(Variable("rate", "", "") if v.name == "q" else v for v in toy_database.states)
     renamed = replace(toy_database, states=states)

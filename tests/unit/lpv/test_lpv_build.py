@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from rtsim.errors import TrimError
-from rtsim.lpv.build import GridPoint, build_database
-from rtsim.lpv.checks import check_neighbours
-from rtsim.lpv.grid import AIRSPEED_KT, NACELLE_DEG, Grid, conversion_grid
-from rtsim.lpv.xv15 import Xv15Grid, source_sha256
+from rtsim.lpv.building.build import GridPoint, build_database
+from rtsim.lpv.building.checks import check_neighbours
+from rtsim.lpv.building.grid import AIRSPEED_KT, NACELLE_DEG, Grid, conversion_grid
+from rtsim.lpv.building.xv15_grid import Xv15Grid, source_sha256
 from rtsim.units import deg, kt
 
 

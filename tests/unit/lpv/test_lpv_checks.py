@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rtsim.aircraft import Condition, Xv15
+from rtsim.aircraft import Condition
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.cli.model import _inside_corridor
-from rtsim.lpv.build import build_database
-from rtsim.lpv.checks import NEIGHBOUR_LIMIT, check_neighbours, describe
-from rtsim.lpv.grid import Grid
-from rtsim.lpv.storage import load_database
-from rtsim.lpv.xv15 import source_sha256, still_trims
+from rtsim.lpv.building.build import build_database
+from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, check_neighbours, describe
+from rtsim.lpv.building.grid import Grid
+from rtsim.lpv.building.xv15_grid import source_sha256, still_trims
+from rtsim.lpv.files.storage import load_database
 
 
 @pytest.fixture(scope="module")

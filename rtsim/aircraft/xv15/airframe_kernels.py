@@ -1,0 +1,210 @@
+"""Wing, fuselage, pylons and fins: forces [N] along body x and z, pitching moment [N m] about the centre of gravity."""
+
+from __future__ import annotations
+
+import math
+
+from rtsim.aircraft.table_kernels import curve
+from rtsim.aircraft.xv15.tables import BodyTables, Configuration, WingTables
+from rtsim.kernels.compiled import inner_kernel
+
+Load = tuple[float, float, float]
+
+
+@inner_kernel
+def fold(alpha: float) -> float:
+    """Angle of attack folded into -90 .. 90 deg; flow from behind is treated as its mirror image (low confidence).
+
+    Args:
+        alpha: Angle of attack [rad].
+    """
+    if alpha > 0.5 * math.pi:
+        return math.pi - alpha
+    if alpha < -0.5 * math.pi:
+        return -math.pi - alpha
+    return alpha
+
+
+@inner_kernel
+def moment_arm(position: tuple[float, float], gravity_centre: tuple[float, float]) -> tuple[float, float]:
+    """Arm from the centre of gravity in body axes (x forward, z down) [m].
+
+    Args:
+        position: Stationline (aft), waterline (up) [m].
+        gravity_centre: The same of the centre of gravity.
+    """
+    return gravity_centre[0] - position[0], gravity_centre[1] - position[1]
+
+
+@inner_kernel
+def wind_to_body(lift: float, drag: float, u: float, w: float, arm: tuple[float, float], moment: float) -> Load:
+    """Resolve lift and drag of a surface in the flow (u, w) into body axes.
+
+    Args:
+        lift: Lift, normal to the flow [N].
+        drag: Drag, along the flow [N].
+        u: Flow velocity along body x [m/s].
+        w: Flow velocity along body z [m/s].
+        arm: Arm of the point of application from the centre of gravity [m].
+        moment: Pitching moment about the point of application [N m].
+    """
+    speed = max(math.sqrt(u * u + w * w), 1e-9)
+    x = (lift * w - drag * u) / speed
+    z = (-lift * u - drag * w) / speed
+    return x, z, moment + arm[1] * x - arm[0] * z
+
+
+@inner_kernel
+def wing_coefficients(
+    wing: WingTables, alpha: float, mast_fraction: float, flap: float, mach: float
+) -> tuple[float, float]:
+    """Lift and drag coefficient of the wing, linear in flap and in mast angle between the tables.
+
+    Args:
+        wing: The tables.
+        alpha: Angle of attack, wing-flap-slipstream corrected [rad].
+        mast_fraction: 0 helicopter, 1 airplane.
+        flap: Flap deflection [rad].
+        mach: Flight Mach number.
+    """
+    nodes = wing.flap_nodes
+    k = 0
+    while k < 2 and flap > nodes[k + 1]:
+        k += 1
+    part = min(max((flap - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+    folded = fold(alpha)
+    lift = 0.0
+    drag = 0.0
+    for end in range(2):
+        weight_end = mast_fraction if end == 0 else 1.0 - mast_fraction
+        for step in range(2):
+            weight = weight_end * (part if step == 1 else 1.0 - part)
+            if weight != 0.0:
+                row = 4 * end + k + step
+                lift += weight * curve(wing.lift, row, folded)
+                drag += weight * curve(wing.drag, row, folded)
+    if folded != alpha:
+        # Lift is normal to the flow on the side given by the flow's direction: mirrored flow, mirrored lift.
+        lift = -lift
+    lift *= 1.0 + wing.mach_gain * mast_fraction * min(max((mach - 0.2) / 0.2, 0.0), 1.0)
+    return lift, drag
+
+
+@inner_kernel
+def wing_angle_of_attack(
+    wing: WingTables, alpha: float, nacelle: float, advance_ratio: float, rotor_force_coefficient: float
+) -> float:
+    """Fuselage angle of attack less the rotors' induced change at the wing (alpha_WFS of NASA CR-166536).
+
+    Args:
+        wing: The tables.
+        alpha: Fuselage angle of attack [rad].
+        nacelle: Nacelle angle [rad].
+        advance_ratio: Airspeed over tip speed.
+        rotor_force_coefficient: Force of both rotors over density, pi, tip speed squared, radius squared.
+    """
+    mast = 0.5 * math.pi - nacelle
+    upwash = wing.upwash[0] + wing.upwash[1] * mast + wing.upwash[2] * mast * mast
+    return alpha - upwash * rotor_force_coefficient / max(0.15, advance_ratio) ** 2
+
+
+@inner_kernel
+def immersed_share(wing: WingTables, airspeed: float) -> float:
+    """How much of the hover download is left at this airspeed, 1 to 0.
+
+    Args:
+        wing: The tables.
+        airspeed: Airspeed [m/s].
+    """
+    ratio = min(abs(airspeed) / wing.immersed_fade_speed, 1.0)
+    return (1.0 - ratio * ratio) ** 2
+
+
+@inner_kernel
+def wing_load(
+    wing: WingTables,
+    air: Configuration,
+    flow: tuple[float, float, float],
+    setting: tuple[float, float, float],
+    wake: tuple[float, float],
+    arms: tuple[tuple[float, float], tuple[float, float]],
+) -> Load:
+    """Free-stream wing load plus the download of the part in the rotor wake.
+
+    Args:
+        wing: The tables.
+        air: Density and speed of sound.
+        flow: u, w and pitch rate [m/s, rad/s].
+        setting: Nacelle angle [rad], flap [rad], wing angle of attack [rad].
+        wake: Mean induced velocity and axial velocity of the rotors [m/s].
+        arms: Arms of the aerodynamic centre and of the download [m].
+    """
+    u, w, q = flow
+    nacelle, flap, alpha = setting
+    arm = arms[0]
+    u_local = u + q * arm[1]
+    w_local = w - q * arm[0]
+    speed_squared = u_local * u_local + w_local * w_local
+    speed = math.sqrt(speed_squared)
+    mast_fraction = min(max(1.0 - nacelle / (0.5 * math.pi), 0.0), 1.0)
+    cl, cd = wing_coefficients(wing, alpha, mast_fraction, flap, speed / air.sound_speed)
+    share = immersed_share(wing, speed)
+    immersed = curve(wing.immersed_area, 0, nacelle) * share
+    pressure = 0.5 * air.density * speed_squared
+    nodes = wing.flap_nodes
+    k = 0
+    while k < 2 and flap > nodes[k + 1]:
+        k += 1
+    part = min(max((flap - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+    cm = (1.0 - part) * curve(wing.moment, k, nacelle) + part * curve(wing.moment, k + 1, nacelle)
+    free_area = wing.area - immersed
+    free = pressure * free_area
+    x, z, moment = wind_to_body(free * cl, free * cd, u_local, w_local, arm, pressure * wing.area * wing.chord * cm)
+    wake_speed = wing.immersed_velocity_factor * wake[0] + wake[1]
+    broadside = -0.5 * math.pi
+    normal_drag = (1.0 - part) * curve(wing.drag, 4 + k, broadside) + part * curve(wing.drag, 5 + k, broadside)
+    download = 0.5 * air.density * wake_speed * abs(wake_speed) * immersed * normal_drag
+    x_wake = -download * math.cos(nacelle)
+    z_wake = download * math.sin(nacelle)
+    return x + x_wake, z + z_wake, moment + arms[1][1] * x_wake - arms[1][0] * z_wake
+
+
+@inner_kernel
+def body_load(
+    body: BodyTables,
+    air: Configuration,
+    flow: tuple[float, float],
+    nacelle: float,
+    induced: float,
+    arms: tuple[tuple[float, float], tuple[float, float], tuple[float, float]],
+) -> Load:
+    """Fuselage, pylons in the rotor wake, spinners and fins.
+
+    Args:
+        body: The tables.
+        air: Density.
+        flow: u, w [m/s].
+        nacelle: Nacelle angle [rad].
+        induced: Mean induced velocity of the rotors [m/s].
+        arms: Arms of the fuselage reference point, the nacelle pivot and the fins [m].
+    """
+    u, w = flow
+    speed = math.sqrt(u * u + w * w)
+    pressure = 0.5 * air.density * speed * speed
+    alpha = math.atan2(w, u)
+    folded = fold(alpha)
+    lift = pressure * curve(body.fuselage, 0, folded)
+    if abs(alpha) > 0.5 * math.pi:
+        lift = 0.0
+    drag = pressure * curve(body.fuselage, 1, folded)
+    x, z, moment = wind_to_body(lift, drag, u, w, arms[0], pressure * curve(body.fuselage, 2, folded))
+    pylon = 0.5 * air.density * induced * abs(induced) * curve(body.pylon_area, 0, nacelle)
+    x_pylon = -pylon * math.cos(nacelle)
+    z_pylon = pylon * math.sin(nacelle)
+    # Incidence of the mast to the flow: 0 when the flow comes along the mast.
+    sin_incidence = abs(u * math.sin(nacelle) + w * math.cos(nacelle)) / max(speed, 1e-9)
+    spinner = pressure * (body.spinner_area + body.spinner_incidence_area * sin_incidence**3)
+    xs, zs, ms = wind_to_body(0.0, spinner, u, w, arms[1], 0.0)
+    xf, zf, mf = wind_to_body(0.0, pressure * body.fin_area, u, w, arms[2], 0.0)
+    moment += arms[1][1] * x_pylon - arms[1][0] * z_pylon + ms + mf
+    return x + x_pylon + xs + xf, z + z_pylon + zs + zf, moment

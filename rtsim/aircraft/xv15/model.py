@@ -1,0 +1,114 @@
+"""The nonlinear XV-15 as an object: derivative, outputs, trim and linear model at any condition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+
+from rtsim.aircraft.atmosphere import standard_atmosphere
+from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
+from rtsim.aircraft.table_kernels import FloatArray
+from rtsim.aircraft.variables import OUTPUTS, STATES
+from rtsim.aircraft.xv15 import dynamics_kernels as kernels
+from rtsim.aircraft.xv15.data_reader import load_tables
+from rtsim.aircraft.xv15.tables import AircraftTables
+
+
+@dataclass(frozen=True, slots=True)
+class Xv15:
+    """The nonlinear symmetric-plane XV-15."""
+
+    tables: AircraftTables
+    """Parameters of the kernels."""
+    _work: FloatArray = field(default_factory=lambda: np.zeros(kernels.WORK_COUNT + 6 * len(STATES)), repr=False)
+
+    @staticmethod
+    def load() -> Xv15:
+        """The aircraft at 13000 lb, sea level, 589 rpm with its flap schedule."""
+        return Xv15(_cached_tables())
+
+    def at(self, condition: Condition) -> Xv15:
+        """The same aircraft with the condition's mass, air, rotor speed and flap.
+
+        Args:
+            condition: The flight condition.
+        """
+        density, sound_speed = standard_atmosphere(condition.pressure_altitude)
+        base = self.tables.configuration
+        configuration = base._replace(
+            mass=base.mass if condition.mass is None else condition.mass,
+            density=density,
+            sound_speed=sound_speed,
+            rotor_speed=base.rotor_speed if condition.rotor_speed is None else condition.rotor_speed,
+            flap=-1.0 if condition.flap is None else condition.flap,
+        )
+        return Xv15(self.tables._replace(configuration=configuration))
+
+    def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
+        """State derivative.
+
+        Args:
+            x: State, shape (17,), order of ``signals.STATES``.
+            u: Inputs, shape (11,), order of ``signals.INPUTS``.
+            nacelle_angle: Nacelle angle [rad].
+        """
+        xdot = np.zeros(len(STATES))
+        kernels.derivative(self.tables, x, u, nacelle_angle, xdot, self._work)
+        return xdot
+
+    def outputs(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
+        """Outputs, order of ``signals.OUTPUTS``.
+
+        Args:
+            x: State.
+            u: Inputs.
+            nacelle_angle: Nacelle angle [rad].
+        """
+        y, xdot = np.zeros(len(OUTPUTS)), np.zeros(len(STATES))
+        kernels.outputs(self.tables, x, u, nacelle_angle, y, xdot, self._work)
+        return y
+
+    def component_loads(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> dict[str, FloatArray]:
+        """Force along body x and z [N] and moment about the centre of gravity [N m] of each component.
+
+        Args:
+            x: State.
+            u: Inputs.
+            nacelle_angle: Nacelle angle [rad].
+        """
+        self.derivative(x, u, nacelle_angle)
+        start = kernels.COMPONENT
+        return {
+            name: self._work[start + 3 * i : start + 3 * i + 3].copy()
+            for i, name in enumerate(("rotors", "wing", "body", "tail"))
+        }
+
+    def trim(self, condition: Condition, guess: TrimPoint | None = None) -> TrimPoint:
+        """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.
+
+        Args:
+            condition: The flight condition.
+            guess: A neighbouring trim to start from (continuation); None: the unstalled trim is searched for.
+        """
+        from rtsim.aircraft.xv15.trim import solve_trim
+
+        return solve_trim(self.at(condition), condition, guess)
+
+    def linearize(self, condition: Condition, trim: TrimPoint, *, step_scale: float = 1.0) -> LinearModel:
+        """Jacobians at a trim point by central differences.
+
+        Args:
+            condition: The flight condition.
+            trim: The trim found there.
+            step_scale: Multiplies every step; a second value checks the Jacobians.
+        """
+        from rtsim.aircraft.xv15.linearize import linearize_at
+
+        return linearize_at(self.at(condition), condition, trim, step_scale=step_scale)
+
+
+@cache
+def _cached_tables() -> AircraftTables:
+    return load_tables()

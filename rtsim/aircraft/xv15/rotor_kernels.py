@@ -1,0 +1,303 @@
+"""Blade-element rotor with gimbal flapping, coning and three-state dynamic inflow.
+
+Axes: ``t`` along the mast (thrust), ``f`` in the disc plane towards the nose, azimuth 0 aft and
+counter-clockwise seen along -t (advancing blade at 90 deg). The second rotor is the mirror image:
+in symmetric flight its thrust, forward force and pitching moment are equal and the rest cancels.
+
+Legend of the short names:
+    b0, b1c, b1s   coning and gimbal flapping [rad]     *d, *dd  their rates
+    l0, l1c, l1s   inflow over tip speed                om       rotor speed [rad/s]
+    vf, vt         hub velocity along f and t [m/s]     p        pitch rate of the mast, nose up [rad/s]
+    ut, up         section velocity in the disc plane and down through it [m/s]
+Sources: Johnson, Helicopter Theory (1980), ch. 5 (flapping, sign of each term); Pitt and Peters 1981 (inflow);
+White and Blake 1979 (fore-aft gradient); gearing and data NASA CR-166536.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.xv15.tables import Configuration, RotorTables
+from rtsim.kernels.compiled import inner_kernel, kernel
+
+# Entries of the load vector written by rotor_loads.
+THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT = 0, 1, 2, 3, 4, 5
+LOAD_COUNT = 6
+# Rows of the scratch array of one blade position; LIFT and DRAG become the normal and the in-plane force.
+ALPHA, SPEED, UT, UP, LIFT, DRAG = 0, 1, 2, 3, 4, 5
+FLOW_COUNT = 6
+
+
+@inner_kernel
+def _angle(y: float, x: float) -> float:
+    """The angle atan2(y, x) [rad], written out so that the loop over the stations becomes vector instructions.
+
+    Reduction to |t| <= tan(pi/8) and the rational approximation of the Cephes library (S. Moshier), error below 3e-16.
+    """
+    size_y, size_x = abs(y), abs(x)
+    steep = size_y > size_x
+    large = size_y if steep else size_x
+    small = size_x if steep else size_y
+    reduced = small > 0.41421356237309503 * large
+    t = (small - large if reduced else small) / (small + large if reduced else large)
+    z = t * t
+    p = (((-8.750608600031904122785e-1 * z - 1.615753718733365076637e1) * z - 7.500855792314704667340e1) * z
+         - 1.228866684490136173410e2) * z - 6.485021904942025371773e1  # fmt: skip
+    q = ((((z + 2.485846490142306297962e1) * z + 1.650270098316988542046e2) * z + 4.328810604912902668951e2) * z
+         + 4.853903996359136964868e2) * z + 1.945506571482613964425e2  # fmt: skip
+    angle = t + t * (z * p / q) + (0.25 * math.pi if reduced else 0.0)
+    angle = 0.5 * math.pi - angle if steep else angle
+    angle = math.pi - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
+
+
+@inner_kernel
+def _section_flow(
+    rotor: RotorTables,
+    tangential: tuple[float, float],
+    axial: tuple[float, float],
+    root_pitch: float,
+    flow: FloatArray,
+) -> None:
+    """Write angle of attack, speed, ut and up at every station.
+
+    Args:
+        rotor: The rotor.
+        tangential: ut at the hub and its growth with radius.
+        axial: up at the hub and its growth with radius.
+        root_pitch: Blade pitch without twist [rad].
+        flow: Written: rows ALPHA, SPEED, UT, UP.
+    """
+    for i in range(rotor.stations.shape[0]):
+        r = rotor.stations[i]
+        ut = tangential[0] + tangential[1] * r
+        up = axial[0] + axial[1] * r
+        alpha = root_pitch + rotor.twist[i] - _angle(up, ut)
+        # In reversed flow the difference can leave the circle on which the section tables are printed.
+        alpha = alpha - 2.0 * math.pi if alpha > math.pi else alpha
+        alpha = alpha + 2.0 * math.pi if alpha < -math.pi else alpha
+        flow[ALPHA, i] = alpha
+        flow[SPEED, i] = math.sqrt(ut * ut + up * up)
+        flow[UT, i] = ut
+        flow[UP, i] = up
+
+
+@inner_kernel
+def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
+    """Look up lift and drag coefficient of every station before compressibility.
+
+    Lift and drag share one grid over the whole circle: one cell and one Hermite basis serve both.
+
+    Args:
+        rotor: The rotor.
+        flow: Row ALPHA is read; written: rows LIFT, DRAG.
+    """
+    data = rotor.section
+    last = data.shape[1] - 2
+    for i in range(rotor.stations.shape[0]):
+        position = (flow[ALPHA, i] - rotor.section_start) / rotor.section_step
+        k = min(max(int(position), 0), last)
+        t = position - k
+        t2 = t * t
+        t3 = t2 * t
+        h01 = 3.0 * t2 - 2.0 * t3
+        h00 = 1.0 - h01
+        h10 = t3 - 2.0 * t2 + t
+        h11 = t3 - t2
+        flow[LIFT, i] = h00 * data[i, k, 0] + h10 * data[i, k, 1] + h01 * data[i, k + 1, 0] + h11 * data[i, k + 1, 1]
+        flow[DRAG, i] = h00 * data[i, k, 2] + h10 * data[i, k, 3] + h01 * data[i, k + 1, 2] + h11 * data[i, k + 1, 3]
+
+
+@inner_kernel
+def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) -> None:
+    """Turn the coefficients into forces normal to and in the disc plane (overwriting LIFT and DRAG) [N].
+
+    Prandtl-Glauert from the data's Mach number; Lock's drag rise relative to the data's Mach number.
+
+    Args:
+        rotor: The rotor.
+        air: Density and speed of sound.
+        flow: Rows as left by ``_section_tables``; written: LIFT becomes the normal, DRAG the in-plane force.
+    """
+    for i in range(rotor.stations.shape[0]):
+        speed = flow[SPEED, i]
+        mach = speed / air.sound_speed
+        mach = min(mach, 0.9)
+        cl = flow[LIFT, i] * (rotor.reference_glauert[i] / math.sqrt(1.0 - mach * mach))
+        critical = rotor.drag_divergence[i] - 0.1 * abs(cl) - 0.1077
+        excess = mach - critical
+        excess = max(0.0, excess)
+        reference = rotor.reference_mach[i] - critical
+        reference = max(0.0, reference)
+        excess *= excess
+        reference *= reference
+        cd = flow[DRAG, i] + rotor.root_drag[i] + 20.0 * (excess * excess - reference * reference)
+        cd = max(cd, 0.003)
+        scale = 0.5 * air.density * speed * rotor.chord[i] * rotor.widths[i]
+        lift = scale * cl * rotor.lifting[i]
+        drag = scale * cd
+        flow[LIFT, i] = lift * flow[UT, i] - drag * flow[UP, i]
+        flow[DRAG, i] = lift * flow[UP, i] + drag * flow[UT, i]
+
+
+@kernel
+def rotor_loads(
+    rotor: RotorTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    flapping: tuple[float, float, float, float, float, float],
+    inflow: tuple[float, float, float],
+    pitch: tuple[float, float],
+    loads: FloatArray,
+) -> None:
+    """Integrate the section loads over the disc.
+
+    Args:
+        rotor: The rotor.
+        air: Density, speed of sound, rotor speed.
+        hub: vf, vt, p.
+        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
+        inflow: l0, l1c, l1s.
+        pitch: Collective at 75 % radius, longitudinal cyclic [rad].
+        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
+    """
+    flow = np.empty((FLOW_COUNT, rotor.stations.shape[0]))
+    rotor_loads_in(rotor, air, hub, flapping, inflow, pitch, loads, flow)
+
+
+@inner_kernel
+def rotor_loads_in(
+    rotor: RotorTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    flapping: tuple[float, float, float, float, float, float],
+    inflow: tuple[float, float, float],
+    pitch: tuple[float, float],
+    loads: FloatArray,
+    flow: FloatArray,
+) -> None:
+    """`rotor_loads` in given work space.
+
+    Args:
+        rotor: The rotor.
+        air: Density, speed of sound, rotor speed.
+        hub: vf, vt, p.
+        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
+        inflow: l0, l1c, l1s.
+        pitch: Collective at 75 % radius, longitudinal cyclic [rad].
+        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
+        flow: Scratch, shape (FLOW_COUNT, stations).
+    """
+    vf, vt, p = hub
+    b0, b0d, b1c, b1cd, b1s, b1sd = flapping
+    l0, l1c, l1s = inflow
+    om = air.rotor_speed
+    tip = om * rotor.radius
+    azimuths = rotor.cos_azimuth.shape[0]
+    stations = rotor.stations
+    for i in range(LOAD_COUNT):
+        loads[i] = 0.0
+    for j in range(azimuths):
+        c = rotor.cos_azimuth[j]
+        s = rotor.sin_azimuth[j]
+        beta = b0 + b1c * c + b1s * s
+        beta_rate = b0d + (b1cd + om * b1s) * c + (b1sd - om * b1c) * s
+        root_pitch = pitch[0] + pitch[1] * s + rotor.pitch_flap * (beta - rotor.precone)
+        gradient = (l1c * c + l1s * s) / rotor.radius
+        axial = (vt + tip * l0 + vf * beta * c, tip * gradient + beta_rate - p * c)
+        _section_flow(rotor, (vf * s, om), axial, root_pitch, flow)
+        _section_tables(rotor, flow)
+        _section_forces(rotor, air, flow)
+        normal_sum = 0.0
+        drag_sum = 0.0
+        torque_sum = 0.0
+        moment_sum = 0.0
+        for i in range(stations.shape[0]):
+            normal_sum += flow[LIFT, i]
+            drag_sum += flow[DRAG, i]
+            torque_sum += flow[DRAG, i] * stations[i]
+            moment_sum += flow[LIFT, i] * stations[i]
+        loads[THRUST] += normal_sum
+        loads[FORWARD_FORCE] += normal_sum * beta * c - drag_sum * s
+        loads[TORQUE] += torque_sum
+        loads[CONING_MOMENT] += moment_sum
+        loads[COSINE_MOMENT] += moment_sum * c
+        loads[SINE_MOMENT] += moment_sum * s
+    for i in range(3):
+        loads[i] *= rotor.blades / azimuths
+    loads[CONING_MOMENT] /= azimuths
+    loads[COSINE_MOMENT] *= 2.0 / azimuths
+    loads[SINE_MOMENT] *= 2.0 / azimuths
+
+
+@inner_kernel
+def flapping_accelerations(
+    rotor: RotorTables,
+    om: float,
+    mast: tuple[float, float],
+    flapping: tuple[float, float, float, float, float, float],
+    loads: FloatArray,
+) -> tuple[float, float, float]:
+    """Accelerations of coning and gimbal in the non-rotating frame [rad/s^2].
+
+    The mast pitching at rate p leaves the disc behind: + p_dot in the cosine and -2 om p in the sine equation.
+
+    Args:
+        rotor: The rotor.
+        om: Rotor speed [rad/s].
+        mast: Pitch rate of the mast, nacelle motion included [rad/s], and its rate [rad/s^2].
+        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
+        loads: From ``rotor_loads``.
+    """
+    b0, _, b1c, b1cd, b1s, b1sd = flapping
+    p, p_dot = mast
+    inertia = rotor.blade_inertia
+    blade_spring = rotor.hub_spring * 2.0 / rotor.blades
+    b0dd = loads[CONING_MOMENT] / inertia - om * om * (
+        b0 + (rotor.coning_frequency_squared - 1.0) * (b0 - rotor.precone)
+    )
+    b1cdd = (loads[COSINE_MOMENT] - blade_spring * b1c) / inertia - 2.0 * om * b1sd + p_dot
+    b1sdd = (loads[SINE_MOMENT] - blade_spring * b1s) / inertia + 2.0 * om * b1cd - 2.0 * om * p
+    return b0dd, b1cdd, b1sdd
+
+
+@inner_kernel
+def inflow_rates(
+    rotor: RotorTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    inflow: tuple[float, float, float],
+    loads: FloatArray,
+) -> tuple[float, float, float]:
+    """Rates of the three inflow states [1/s].
+
+    Args:
+        rotor: The rotor.
+        air: Density and rotor speed.
+        hub: vf, vt, p.
+        inflow: l0, l1c, l1s.
+        loads: From ``rotor_loads``.
+    """
+    l0, l1c, l1s = inflow
+    om = air.rotor_speed
+    tip = om * rotor.radius
+    force_scale = air.density * math.pi * rotor.radius**2 * tip * tip
+    thrust_coefficient = loads[THRUST] / force_scale
+    moment_scale = 0.5 * rotor.blades / (force_scale * rotor.radius)
+    mu = hub[0] / tip
+    # Two rotors side by side act as one wing of twice the span: less induced velocity in forward flight.
+    momentum = l0 / (rotor.induced_factor * (1.0 + curve(rotor.side_by_side, 0, abs(mu))))
+    through = hub[1] / tip + momentum
+    total = max(math.sqrt(mu * mu + through * through), 0.01)
+    mass_flow = max((mu * mu + through * (through + momentum)) / total, 0.02)
+    sin_skew = mu / total
+    cos_skew = abs(through) / total
+    l0_rate = om / rotor.apparent_mass * (thrust_coefficient - 2.0 * momentum * total)
+    lateral_gain = 4.0 / ((1.0 + cos_skew) * mass_flow)
+    cosine_target = rotor.skew_gradient * sin_skew * l0 + lateral_gain * cos_skew * moment_scale * loads[COSINE_MOMENT]
+    sine_target = lateral_gain * moment_scale * loads[SINE_MOMENT]
+    bandwidth = om / (rotor.gradient_apparent_mass * lateral_gain)
+    return l0_rate, bandwidth * (cosine_target - l1c), bandwidth * (sine_target - l1s)

@@ -1,0 +1,446 @@
+"""What ``rtsim trim`` and ``rtsim linearize`` answer: a flight condition solved from the database or afresh."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rtsim.errors import InputError, TrimError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy as np
+    import numpy.typing as npt
+
+    from rtsim.aircraft import Condition, TrimPoint, Variable
+    from rtsim.lpv import LpvAircraft
+    from rtsim.pilot.schedule import OuterLoop
+
+    FloatArray = npt.NDArray[np.float64]
+
+ENGINE_EFFICIENCY = 0.93
+"""Shaft power of both rotors over engine power."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A flight condition as asked for on the command line, in the units of the options."""
+
+    airspeed_kt: float
+    """Horizontal airspeed."""
+    nacelle_deg: float
+    """Nacelle angle."""
+    nonlinear: bool
+    """Solve the nonlinear model even at the default condition."""
+    flap_deg: float | None
+    """Flap deflection; None: the schedule."""
+    rotor_rpm: float | None
+    """Rotor speed; None: the database's."""
+    weight_lb: float | None
+    """Weight; None: the database's."""
+    altitude_m: float | None
+    """Pressure altitude; None: sea level."""
+    acceleration_kt_s: float | None
+    """Level acceleration; None: none."""
+    database: Path | None
+    """Database file; None: the shipped one."""
+
+    @property
+    def solves_nonlinear(self) -> bool:
+        """Whether the nonlinear model must be solved: the database holds one condition only."""
+        asked = (self.flap_deg, self.rotor_rpm, self.weight_lb, self.altitude_m, self.acceleration_kt_s)
+        return self.nonlinear or any(value is not None for value in asked)
+
+
+_LIMITS: tuple[tuple[str, float, float, str], ...] = (
+    ("airspeed_kt", -100.0, 400.0, "kn"),
+    ("nacelle_deg", 0.0, 95.0, "deg"),
+    ("flap_deg", 0.0, 75.0, "deg"),
+    ("rotor_rpm", 100.0, 1000.0, "rpm"),
+    ("weight_lb", 5000.0, 20000.0, "lb"),
+    ("altitude_m", -1000.0, 11000.0, "m"),
+    ("acceleration_kt_s", -20.0, 20.0, "kn/s"),
+)
+
+
+_STOPS: tuple[tuple[str, float, float, str], ...] = (
+    ("stick_in", -4.8, 4.8, "in"),
+    ("lever_fraction", 0.0, 1.0, ""),
+    ("elevator_deg", -20.0, 20.0, "deg"),
+    ("cyclic_deg", -10.06, 10.06, "deg"),
+    ("flapping_deg", 0.0, 12.0, "deg"),
+    ("engine_power_shp", 0.0, 3604.0, "shp"),
+)
+"""Stops of controls and gimbal, and what both engines give for two minutes (docs/model.md)."""
+
+
+def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
+    """Eigenvalues with natural frequency and damping ratio, slowest first.
+
+    Args:
+        A: State matrix (n, n) [1/s].
+
+    Returns:
+        For each: ``re``, ``im``, ``wn_rad_s`` and ``zeta`` (1 or -1 for real ones, 0 at the origin).
+    """
+    import numpy as np
+
+    return _described(np.linalg.eigvals(A))
+
+
+def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
+    return [
+        {
+            "re": float(root.real),
+            "im": float(root.imag),
+            "wn_rad_s": float(abs(root)),
+            "zeta": float(-root.real / abs(root)) if abs(root) > 0.0 else 0.0,
+        }
+        for root in sorted(roots, key=lambda root: (abs(root), root.imag))
+    ]
+
+
+def checked(request: Request) -> Request:
+    """Refuse values out of range.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The same request.
+
+    Raises:
+        InputError: Naming the option and its range.
+    """
+    for name, low, high, unit in _LIMITS:
+        value = getattr(request, name)
+        if value is not None and not (math.isfinite(value) and low <= value <= high):
+            option = "--" + name.replace("_", "-")
+            raise InputError(
+                "out of range",
+                key=option,
+                value=value,
+                allowed=f"{low:g} to {high:g} {unit}",
+                mend="choose a value in this range",
+            )
+    return request
+
+
+def checked_outer_loop(outer_loop: str) -> OuterLoop:
+    """Refuse an outer loop that there is not.
+
+    Args:
+        outer_loop: What was asked for.
+
+    Returns:
+        The same, as its type.
+
+    Raises:
+        InputError: Naming the option and the choices.
+    """
+    from rtsim.pilot.schedule import OUTER_LOOPS
+
+    for name in OUTER_LOOPS:
+        if name == outer_loop:
+            return name
+    raise InputError(
+        "no such outer loop",
+        key="--outer-loop",
+        value=outer_loop,
+        allowed=", ".join(OUTER_LOOPS),
+        mend="choose one",
+    )
+
+
+def _condition(request: Request) -> Condition:
+    from rtsim.aircraft import Condition
+    from rtsim.units import deg, kt, lb, rpm
+
+    return Condition(
+        airspeed=kt(request.airspeed_kt),
+        nacelle_angle=deg(request.nacelle_deg),
+        acceleration=kt(request.acceleration_kt_s or 0.0),
+        flap=None if request.flap_deg is None else deg(request.flap_deg),
+        rotor_speed=None if request.rotor_rpm is None else rpm(request.rotor_rpm),
+        mass=None if request.weight_lb is None else lb(request.weight_lb),
+        pressure_altitude=request.altitude_m or 0.0,
+    )
+
+
+def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
+    """Trim the nonlinear model at the condition.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The result by JSON key, and the trim.
+    """
+    from rtsim.aircraft import INPUTS, OUTPUTS, STATES
+    from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
+    from rtsim.aircraft.xv15.model import Xv15
+    from rtsim.units import to_deg, to_rpm
+
+    aircraft = Xv15.load()
+    condition = _condition(request)
+    point = aircraft.trim(condition)
+    tables = aircraft.tables
+    flap = condition.flap
+    if flap is None:
+        flap = float(flap_schedule(tables.controls, condition.airspeed, condition.nacelle_angle))
+    rotor_speed = tables.configuration.rotor_speed if condition.rotor_speed is None else condition.rotor_speed
+    values = _named(point, STATES, INPUTS, OUTPUTS)
+    return _trim_result(request, values, to_deg(flap), to_rpm(float(rotor_speed)), point.converged), point
+
+
+def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
+    """Trim the LPV aircraft.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The result by JSON key, and the trim.
+
+    Raises:
+        InputError: The condition is outside the database.
+    """
+    from rtsim.units import deg, kt, to_deg, to_rpm
+
+    aircraft = _lpv(request)
+    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
+    point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
+    database = aircraft.database
+    flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
+    values = _named(point, database.states, database.inputs, database.outputs)
+    return _trim_result(request, values, to_deg(flap), to_rpm(database.rotor_speed), point.converged), point
+
+
+def solvable(request: Request) -> Request:
+    """Ask the nonlinear model where the shipped database has no answer: beside its edge there may be a trim.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The request, or the same for the nonlinear model.
+
+    Raises:
+        InputError: The condition is outside the database.
+    """
+    from rtsim.units import deg, kt
+
+    if request.solves_nonlinear or request.database is not None:
+        return request
+    if _lpv(request).trim(airspeed=kt(request.airspeed_kt), nacelle=deg(request.nacelle_deg)).converged:
+        return request
+    return dataclasses.replace(request, nonlinear=True)
+
+
+def _lpv(request: Request) -> LpvAircraft:
+    from rtsim.lpv import load_aircraft
+
+    return load_aircraft(request.database)
+
+
+def _named(
+    point: TrimPoint,
+    states: tuple[Variable, ...],
+    inputs: tuple[Variable, ...],
+    outputs: tuple[Variable, ...],
+) -> dict[str, float]:
+    values: dict[str, float] = {}
+    for variables, vector in ((states, point.x), (inputs, point.u), (outputs, point.y)):
+        values |= {variable.name: float(value) for variable, value in zip(variables, vector, strict=True)}
+    return values
+
+
+def _trim_result(
+    request: Request, values: dict[str, float], flap_deg: float, rotor_rpm: float, converged: bool
+) -> dict[str, Any]:
+    from rtsim.corridor import load_corridor
+    from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, STICK_HALF_TRAVEL_IN, deg, kt, to_deg
+
+    solved = {
+        "pitch_deg": to_deg(values["pitch"]),
+        "stick_in": values["stick"] * STICK_HALF_TRAVEL_IN,
+        "elevator_deg": to_deg(values["elevator"]),
+        "cyclic_deg": to_deg(values["cyclic_1s"]),
+        "collective_75_deg": to_deg(values["collective_75"]),
+        "lever_fraction": values["lever"],
+        "thrust_per_rotor_lb": values["thrust"] / POUND_FORCE,
+        "power_shp": values["power"] / HORSEPOWER,
+        "engine_power_shp": values["power"] / HORSEPOWER / ENGINE_EFFICIENCY,
+        "mast_torque_inlb": values["torque"] / INCH_POUND,
+        "flapping_deg": to_deg(math.hypot(values["flap_1c"], values["flap_1s"])),
+    }
+    return {
+        "airspeed_kt": request.airspeed_kt,
+        "nacelle_deg": request.nacelle_deg,
+        "flap_deg": flap_deg,
+        "rotor_rpm": rotor_rpm,
+        # where nothing was solved, the last iterate is no answer
+        **(solved if converged else dict.fromkeys(solved)),
+        "converged": converged,
+        "beyond_limits": _beyond_limits(solved) if converged else [],
+        "inside_corridor": load_corridor("design").inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
+        "source": "nonlinear" if request.solves_nonlinear else "database",
+    }
+
+
+def _beyond_limits(solved: dict[str, float]) -> list[str]:
+    """What a trim asks of the aircraft that it cannot give, in words: the equations know no stops."""
+    found = []
+    for key, low, high, unit in _STOPS:
+        if not low - 1e-9 <= solved[key] <= high + 1e-9:
+            name = key.removesuffix(f"_{unit}").removesuffix("_fraction").replace("_", " ")
+            found.append(f"{name} {solved[key]:.3g} {unit}".rstrip() + f" (limits {low:g} to {high:g})")
+    return found
+
+
+def no_trim(request: Request, point: TrimPoint) -> TrimError:
+    """Say that there is no trim, and what did not close.
+
+    Args:
+        request: What was asked for.
+        point: Where the search ended.
+
+    Returns:
+        The error to raise.
+    """
+    where = f"{request.airspeed_kt:g} kn at nacelle {request.nacelle_deg:g} deg"
+    left = f"; '{point.unclosed}' does not close" if getattr(point, "unclosed", "") else ""
+    mend = "see where the aircraft flies with 'rtsim corridor'"
+    if not request.solves_nonlinear:
+        mend += ", or solve exactly there with --nonlinear"
+    return TrimError(f"there is no level-flight trim at {where}{left}", mend=mend)
+
+
+def nonlinear_model(request: Request) -> dict[str, Any]:
+    """Linearize the nonlinear model at the condition.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The model by JSON key.
+
+    Raises:
+        TrimError: There is no trim to linearize at.
+    """
+    from rtsim.aircraft import INPUTS, OUTPUTS, STATES
+    from rtsim.aircraft.xv15.model import Xv15
+    from rtsim.lpv.building.xv15_grid import flown_model
+
+    aircraft, condition = Xv15.load(), _condition(request)
+    point = aircraft.trim(condition)
+    if not point.converged:
+        raise no_trim(request, point)
+    model = flown_model(aircraft, condition, point)
+    return _model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
+
+
+def database_model(request: Request) -> dict[str, Any]:
+    """Take the linear model from the database.
+
+    Args:
+        request: What was asked for.
+
+    Returns:
+        The model by JSON key.
+
+    Raises:
+        TrimError: There is no trim around.
+    """
+    from rtsim.units import deg, kt
+
+    aircraft = _lpv(request)
+    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
+    matrices = aircraft.matrices(airspeed=airspeed, nacelle=nacelle)
+    if not aircraft.is_valid(airspeed=airspeed, nacelle=nacelle):
+        raise no_trim(request, aircraft.trim(airspeed=airspeed, nacelle=nacelle))
+    database = aircraft.database
+    return _model_result((database.states, database.inputs, database.outputs), matrices)
+
+
+def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
+    """Linearize the loop of aircraft and pilot, frozen at the condition and sampled as flown.
+
+    Args:
+        request: What was asked for.
+        outer_loop: ``integrators`` or ``pi``.
+
+    Returns:
+        The model by JSON key; ``A`` is the map over one frame.
+
+    Raises:
+        InputError: Another condition than the database's is asked for, or a pilot that it does not hold.
+        TrimError: There is no trim.
+    """
+    import numpy as np
+
+    from rtsim.analysis.frozen_loop import Condition as Command
+    from rtsim.analysis.frozen_loop import frozen_loop
+    from rtsim.units import deg, kt
+
+    if request.solves_nonlinear:
+        raise InputError(
+            "the pilot is designed for the database's own condition",
+            key="--closed-loop",
+            mend="leave out --nonlinear, flaps, rotor speed, weight, altitude and acceleration",
+        )
+    chosen = checked_outer_loop(outer_loop)
+    aircraft = _lpv(request)
+    airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
+    point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
+    if not point.converged:
+        raise no_trim(request, point)
+    database = aircraft.database
+    if chosen not in database.pilot:
+        raise InputError(
+            "the database holds no gains of this pilot",
+            key="--outer-loop",
+            value=outer_loop,
+            allowed=", ".join(database.pilot) or "none",
+            mend="run 'rtsim model build'",
+        )
+    loop = frozen_loop(database, Command(airspeed, nacelle), outer_loop=chosen)
+    matrix = loop.matrix
+    pilot_states = matrix.shape[0] - len(database.states)
+    names = [variable.name for variable in database.states] + [f"pilot_{k}" for k in range(pilot_states)]
+    growth = loop.growth()
+    return {
+        "states": names,
+        "inputs": [],
+        "outputs": [],
+        "units": {
+            "states": [variable.unit for variable in database.states] + [""] * pilot_states,
+            "inputs": [],
+            "outputs": [],
+        },
+        "A": matrix,
+        "B": np.zeros((len(names), 0)),
+        "C": np.zeros((0, len(names))),
+        "D": np.zeros((0, 0)),
+        "dt_s": loop.dt,
+        "outer_loop": outer_loop,
+        "eigenvalues": _described(loop.eigenvalues()),
+        "growth_rad_s": growth,
+        "stable": growth < 0.0,
+    }
+
+
+def _model_result(
+    variables: tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]],
+    matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+) -> dict[str, Any]:
+    kinds = ("states", "inputs", "outputs")
+    return {
+        **{kind: [variable.name for variable in row] for kind, row in zip(kinds, variables, strict=True)},
+        "units": {kind: [variable.unit for variable in row] for kind, row in zip(kinds, variables, strict=True)},
+        **dict(zip("ABCD", matrices, strict=True)),
+    }

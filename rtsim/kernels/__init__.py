@@ -1,0 +1,1 @@
+"""How kernels are made, kept and called; what all of them use."""

@@ -1,0 +1,1 @@
+"""Databases on disk: NetCDF for people and programs, MAT for MATLAB."""

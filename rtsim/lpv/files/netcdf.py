@@ -1,0 +1,213 @@
+"""The database as a self-describing NetCDF-4 file: dimensions, coordinates, units, long names, attributes.
+
+Layout: the root group holds axes, trim map and linear models; ``/pilot/<design>`` holds the gains of one design.
+A file is written beside its target and renamed, so a reader never meets half of one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from rtsim.errors import InputError, OutputError
+from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.lpv.files.assemble import KINDS, assemble_database
+from rtsim.lpv.validation import AXES
+from rtsim.lpv.variables import Variable
+
+SHIPPED: Final = Path(__file__).parents[2] / "aircraft" / "xv15" / "data" / "xv15_lpv.nc"
+"""The database that comes with rtsim."""
+FORMAT: Final = "rtsim LPV database 1"
+"""Value of the attribute ``format``; raised when the layout changes."""
+
+_GRID = ("layer", "airspeed", "nacelle")
+_TAILS: Final[Mapping[str, tuple[str, ...]]] = {
+    "x_ref": ("state",), "u_ref": ("input",), "y_ref": ("output",), "xdot_ref": ("state",), "df_dnacelle": ("state",),
+    "A": ("state", "state_column"), "B": ("state", "input"), "C": ("output", "state"), "D": ("output", "input"),
+    "valid": (),
+}  # fmt: skip
+_LONG_NAMES: Final[Mapping[str, str]] = {
+    "layer_acceleration": "level acceleration of the trims of each layer",
+    "airspeed": "horizontal airspeed, signed",
+    "nacelle": "nacelle angle, pi/2 helicopter, 0 airplane",
+    "x_ref": "trim state",
+    "u_ref": "trim input",
+    "y_ref": "trim output",
+    "xdot_ref": "state derivative at the trim",
+    "A": "derivative of the state derivative with the state",
+    "B": "derivative of the state derivative with the input",
+    "C": "derivative of the output with the state",
+    "D": "derivative of the output with the input",
+    "df_dnacelle": "derivative of the state derivative with the nacelle angle",
+    "valid": "a trim exists here; other cells repeat the nearest airspeed that has one",
+    "flap": "flap deflection of the flap schedule",
+    "rotor_speed": "rotor speed, held",
+}
+_UNITS: Final[Mapping[str, str]] = {
+    "layer_acceleration": "m s-2", "airspeed": "m s-1", "nacelle": "rad", "flap": "rad", "rotor_speed": "rad s-1",
+}  # fmt: skip
+_SEPARATE_UNITS = "of the variables along its dimensions, SI and radians"
+
+
+def read_database(path: str | Path | None = None) -> Database:
+    """Read a database; without a path, the shipped one.
+
+    Args:
+        path: A file written by ``write_database`` or laid out like one.
+
+    Returns:
+        The database, checked, its arrays read-only.
+
+    Raises:
+        InputError: The file is missing, no NetCDF file, or not a database the kernels could fly.
+    """
+    file = Path(path) if path is not None else SHIPPED
+    if not file.is_file():
+        mend = "run 'rtsim model build'" if path is None else "check the path"
+        raise InputError("no such database file", file=str(file), mend=mend)
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(str(file), "r") as dataset:
+            dataset.set_auto_mask(False)
+            return _read(dataset, str(file))
+    except OSError as error:
+        raise InputError("not a readable NetCDF file", file=str(file), value=str(error)) from error
+
+
+def write_database(database: Database, path: str | Path) -> None:
+    """Write a database; the target is replaced in one move when all is written.
+
+    Args:
+        database: What to write.
+        path: The target, usually ``*.nc``.
+
+    Raises:
+        OutputError: The file could not be written; the old one, if any, still stands.
+    """
+    import netCDF4
+
+    target = Path(path)
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        with netCDF4.Dataset(str(part), "w", format="NETCDF4") as dataset:
+            _write(dataset, database)
+        part.replace(target)
+    except (OSError, RuntimeError) as error:
+        raise OutputError(f"{target}: the database could not be written ({error}).") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def _write(dataset: Any, database: Database) -> None:
+    dataset.setncatts({**database.attributes, "format": FORMAT, "Conventions": "CF-1.11"})
+    dataset.content_hash = database.content_hash
+    for name, values in zip(_GRID, (database.layer_acceleration, database.airspeed, database.nacelle), strict=True):
+        dataset.createDimension(name, values.size)
+    for kind, variables in (("state", database.states), ("input", database.inputs), ("output", database.outputs)):
+        dataset.createDimension(kind, len(variables))
+        for column, part in (
+            (f"{kind}_name", "name"),
+            (f"{kind}_unit", "unit"),
+            (f"{kind}_description", "description"),
+        ):
+            text = dataset.createVariable(column, str, (kind,))
+            text[:] = np.array([getattr(variable, part) for variable in variables], dtype=object)
+    dataset.createDimension("state_column", len(database.states))
+    _put(dataset, "layer_acceleration", ("layer",), database.layer_acceleration)
+    _put(dataset, "airspeed", ("airspeed",), database.airspeed)
+    _put(dataset, "nacelle", ("nacelle",), database.nacelle)
+    _put(dataset, "flap", ("airspeed", "nacelle"), database.flap)
+    _put(dataset, "rotor_speed", (), np.array(database.rotor_speed))
+    for name in GRIDDED:
+        values = getattr(database, name)
+        if name != "valid":
+            values = np.where(database.valid.reshape(database.valid.shape + (1,) * len(_TAILS[name])), values, np.nan)
+        _put(dataset, name, _GRID + _TAILS[name], values)
+    for design, pilot in database.pilot.items():
+        group = dataset.createGroup(f"pilot/{design}")
+        group.setncatts(dict(pilot.attributes))
+        for name, array in pilot.arrays.items():
+            dimensions = []
+            for axis, size in enumerate(array.shape):
+                dimensions.append(f"{name}_{axis}")
+                group.createDimension(dimensions[-1], size)
+            variable = group.createVariable(name, "f8", dimensions, zlib=bool(array.shape), complevel=6, shuffle=True)
+            variable[...] = array
+
+
+def _put(dataset: Any, name: str, dimensions: tuple[str, ...], values: npt.NDArray[Any]) -> None:
+    kind = "i1" if values.dtype == np.bool_ else "f8"
+    missing = np.nan if name in GRIDDED and kind == "f8" else None
+    variable = dataset.createVariable(
+        name, kind, dimensions, zlib=bool(dimensions), complevel=6, shuffle=True, fill_value=missing
+    )
+    variable.long_name = _LONG_NAMES[name]
+    if name != "valid":
+        variable.units = _UNITS.get(name, _SEPARATE_UNITS)
+    variable[...] = values
+
+
+def _read(dataset: Any, file: str) -> Database:
+    arrays = {
+        name: np.asarray(dataset.variables[name][...])
+        for name in (*AXES, *GRIDDED, "flap", "rotor_speed")
+        if name in dataset.variables
+    }
+    attributes = {name: _plain(dataset.getncattr(name)) for name in dataset.ncattrs()}
+    stored = attributes.pop("content_hash", None)
+    for name in ("format", "Conventions"):
+        attributes.pop(name, None)
+    database = assemble_database(
+        arrays,
+        {kind: _read_variables(dataset, kind, file) for kind in KINDS},
+        attributes=attributes,
+        pilot=_read_pilots(dataset),
+        file=file,
+    )
+    if stored is not None and stored != database.content_hash:
+        raise InputError(
+            "the numbers do not match the content hash written with them",
+            file=file,
+            key="content_hash",
+            mend="restore the file, or remove the attribute if the change was meant",
+        )
+    return database
+
+
+def _read_variables(dataset: Any, kind: str, file: str) -> tuple[Variable, ...]:
+    for column in (f"{kind}_name", f"{kind}_unit"):
+        if column not in dataset.variables:
+            raise InputError("the list is missing", file=file, key=column, mend="see docs/lpv.md for the layout")
+    names = [str(text) for text in dataset.variables[f"{kind}_name"][:]]
+    units = [str(text) for text in dataset.variables[f"{kind}_unit"][:]]
+    column = f"{kind}_description"
+    described = column in dataset.variables
+    descriptions = [str(text) for text in dataset.variables[column][:]] if described else [""] * len(names)
+    return tuple(Variable(*row) for row in zip(names, units, descriptions, strict=True))
+
+
+def _read_pilots(dataset: Any) -> dict[str, PilotArrays]:
+    if "pilot" not in dataset.groups:
+        return {}
+    pilots = {}
+    for design, group in dataset.groups["pilot"].groups.items():
+        arrays = {}
+        for name, variable in group.variables.items():
+            array = np.ascontiguousarray(variable[...], dtype=np.float64)
+            array.setflags(write=False)
+            arrays[name] = array
+        pilots[design] = PilotArrays(arrays, {key: _plain(group.getncattr(key)) for key in group.ncattrs()})
+    return pilots
+
+
+def _plain(value: Any) -> str | float | int:
+    plain: str | float | int = value.item() if isinstance(value, np.generic) else value
+    return plain

@@ -1,0 +1,1 @@
+"""Scenario files: layout, reading, checking; what they mean in SI."""

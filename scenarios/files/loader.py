@@ -1,0 +1,317 @@
+"""Reads scenario files: TOML in, :class:`~scenarios.files.scenario.Scenario` out, every mistake one clear sentence."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from rtsim.errors import InputError
+from rtsim.measures.metrics import METRIC_NAMES
+from rtsim.plugins import closest, suggestion
+from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
+from rtsim.units import deg, kt
+from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
+from scenarios.files.nacelle_laws import automatic_problems, automatic_settings
+from scenarios.files.problems import explain
+from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
+from scenarios.files.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
+from scenarios.files.trial import pulses_of, trial_of, trial_problems
+
+MAX_FILE_BYTES = 4_000_000
+"""A scenario file larger than this is refused before it is read [bytes]."""
+
+
+def library_names() -> list[str]:
+    """Names of the scenarios that come with rtsim, sorted."""
+    folder = resources.files("scenarios") / "library"
+    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_scenario(name_or_path: str | Path) -> Scenario:
+    """Load a scenario of the library by name, or any scenario file by path.
+
+    Args:
+        name_or_path: A library name such as ``typical_conversion``, or a path; a word with a ``/`` or ending in
+            ``.toml`` is a path.
+
+    Raises:
+        InputError: For the first mistake found; :func:`scenario_problems` gives all of them.
+    """
+    text, file = _read(name_or_path)
+    scenario, problems = parse_scenario(text, file=file)
+    if scenario is None:
+        raise problems[0]
+    return scenario
+
+
+def scenario_problems(path: str | Path) -> list[InputError]:
+    """All mistakes of a scenario file; an empty list means it can be flown.
+
+    Args:
+        path: The file, or a library name.
+    """
+    try:
+        text, file = _read(path)
+    except InputError as error:
+        return [error]
+    return parse_scenario(text, file=file)[1]
+
+
+def parse_scenario(text: str, *, file: str) -> tuple[Scenario | None, list[InputError]]:
+    """Check the text of a scenario file.
+
+    Args:
+        text: The TOML text.
+        file: Where it came from, for the messages.
+
+    Returns:
+        The scenario and no problems, or None and at least one.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        return None, [InputError(f"is not valid TOML: {_lower(str(error))}", file=file, mend="correct this line")]
+    except RecursionError:
+        return None, [InputError("is nested too deeply", file=file, mend="write flat tables")]
+    try:
+        content = ScenarioFile.model_validate(data)
+    except ValidationError as error:
+        return None, explain(error, ScenarioFile, file)
+    problems = _contradictions(content, file)
+    if problems:
+        return None, problems
+    try:
+        return _scenario(content, text, file), []
+    except InputError as error:
+        return None, [InputError(str(error).rstrip("."), file=file)]
+
+
+def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> ProgrammePoint:
+    """A named start as a point.
+
+    Args:
+        condition: ``hover``, ``conversion`` or ``cruise``.
+        altitude: Altitude [m].
+    """
+    if condition not in START_CONDITIONS:
+        raise InputError(
+            "is not a known start",
+            key="start",
+            value=condition,
+            allowed=", ".join(START_CONDITIONS),
+            mend=suggestion(condition, START_CONDITIONS, otherwise="choose one"),
+        )
+    airspeed, nacelle_angle = START_CONDITIONS[condition]
+    return ProgrammePoint(airspeed, nacelle_angle, altitude)
+
+
+def _beside(database: str, file: str) -> str:
+    """A database as a path: relative ones lie beside the scenario."""
+    return str((Path(file).parent / database).resolve()) if database else ""
+
+
+def _lower(message: str) -> str:
+    return message[:1].lower() + message[1:]
+
+
+def _read(name_or_path: str | Path) -> tuple[str, str]:
+    """The text of a scenario and how to call its file in messages."""
+    text = str(name_or_path)
+    is_path = isinstance(name_or_path, Path) or "/" in text or text.endswith(".toml")
+    if not is_path:
+        names = library_names()
+        if text in names:
+            return (resources.files("scenarios") / "library" / f"{text}.toml").read_text(encoding="utf-8"), text
+        ordered = closest(text, names)
+        raise InputError(
+            "is not a scenario of the library",
+            key="scenario",
+            value=text,
+            allowed=", ".join(ordered),
+            mend=f"{suggestion(text, names, otherwise='choose one')}, or give a path ending in .toml",
+        )
+    path = Path(name_or_path)
+    try:
+        if path.is_dir():
+            raise InputError("is a directory", file=text, mend="name a scenario file")
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise InputError("is too large for a scenario", file=text, allowed=f"at most {MAX_FILE_BYTES} bytes")
+        return path.read_text(encoding="utf-8-sig"), text  # some editors begin UTF-8 files with a mark
+    except FileNotFoundError:
+        raise InputError(
+            "does not exist", file=text, mend=f"check the path, or take one of {', '.join(library_names())}"
+        ) from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"is not a text file (byte {error.start} is not UTF-8)", file=text, mend="save it as UTF-8"
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f"cannot be read: {_lower(error.strerror or str(error))}", file=text, mend="check its permissions"
+        ) from None
+
+
+def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
+    """Mistakes that involve more than one key."""
+    found = _start_contradictions(content, file)
+    if content.programme is None and content.duration_s is None:
+        found.append(InputError("is missing", file=file, key="duration_s", mend="add it: a hold has no end of its own"))
+    if content.programme is not None:
+        found += _point_contradictions(content.programme, file)
+    found += disturbance_problems(content.air, content.faults, file)
+    found += automatic_problems(content.automatic, content.flight.nacelle, file)
+    found += trial_problems(content.pulses, content.trial, has_events=bool(content.events), file=file)
+    for number, clause in enumerate(content.expect):
+        key = f"expect[{number}]"
+        if clause.metric not in METRIC_NAMES:
+            found.append(
+                InputError(
+                    "is not a metric",
+                    file=file,
+                    key=f"{key}.metric",
+                    value=clause.metric,
+                    allowed=", ".join(METRIC_NAMES),
+                    mend=suggestion(clause.metric, METRIC_NAMES, otherwise="choose one"),
+                )
+            )
+        if clause.min is None and clause.max is None:
+            found.append(InputError("has no limit", file=file, key=key, mend="add min, max or both"))
+        elif clause.min is not None and clause.max is not None and clause.min > clause.max:
+            found.append(
+                InputError(
+                    "is larger than max",
+                    file=file,
+                    key=f"{key}.min",
+                    value=clause.min,
+                    allowed=f"at most {clause.max:g}",
+                    mend="swap them",
+                )
+            )
+    return found
+
+
+def _start_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
+    start, found = content.start, []
+    numbers = start.airspeed_kt is not None or start.nacelle_deg is not None
+    if start.condition is not None and numbers:
+        found.append(
+            InputError(
+                "is given twice: by name and in numbers",
+                file=file,
+                key="start",
+                mend="keep either condition or airspeed_kt and nacelle_deg",
+            )
+        )
+    if (start.airspeed_kt is None) != (start.nacelle_deg is None):
+        key = "airspeed_kt" if start.airspeed_kt is None else "nacelle_deg"
+        found.append(InputError("is missing", file=file, key=f"start.{key}", mend="give both numbers of the start"))
+    if content.programme is None and start.condition is None and not numbers:
+        found.append(
+            InputError("is missing", file=file, key="start", mend="say where the flight starts, or give a programme")
+        )
+    return found
+
+
+def _point_contradictions(programme: ProgrammeTable, file: str) -> list[InputError]:
+    """Points are either all timed, or none is; a timed point has no rates."""
+    timed = [point.time_s is not None for point in programme.points]
+    if any(timed) and not all(timed):
+        key = f"programme.points[{timed.index(False)}].time_s"
+        return [InputError("is missing", file=file, key=key, mend="give every point a time, or none")]
+    found = []
+    for number, point in enumerate(programme.points):
+        for name in ("acceleration_kt_s", "nacelle_rate_deg_s", "climb_rate_m_s", "hold_s"):
+            if timed[0] and getattr(point, name) is not None:
+                key = f"programme.points[{number}].{name}"
+                found.append(InputError("has no meaning beside time_s", file=file, key=key, mend="delete one of them"))
+    return found
+
+
+def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
+    """Bring checked content to SI."""
+    altitude = DEFAULT_ALTITUDE if content.start.altitude_m is None else content.start.altitude_m
+    start = _start(content.start, altitude)
+    if content.programme is not None:
+        programme = _programme(content.programme, altitude)
+        start = programme.at(0.0) if start is None else start
+    else:
+        assert start is not None  # _start_contradictions refuses a hold without start
+        programme = Programme.hold(airspeed=start.airspeed, nacelle_angle=start.nacelle_angle, altitude=start.altitude)
+    duration = programme.duration if content.duration_s is None else content.duration_s
+    if duration <= 0.0:
+        raise InputError("is missing", key="duration_s", mend="add it: a programme of one point has no end of its own")
+    options = content.flight
+    return Scenario(
+        name=content.name,
+        title=content.title,
+        description=content.description.strip(),
+        programme=programme,
+        duration=duration,
+        start=start,
+        plant=options.plant,
+        outer_loop=options.outer_loop,
+        pilot=options.pilot,
+        corridor=options.corridor,
+        protection=options.protection,
+        rate_hz=options.rate_hz,
+        seed=options.seed,
+        wind=kt(options.wind_kt),
+        pilot_noise=options.pilot_noise,
+        aids=tuple(dict.fromkeys(options.aids)),
+        automatic_flaps=options.automatic_flaps,
+        governor=options.governor,
+        air=air_of(content.air),
+        faults=faults_of(content.faults),
+        events=tuple(
+            ScenarioEvent(event.time_s, event.pilot) for event in sorted(content.events, key=lambda event: event.time_s)
+        ),
+        expectations=tuple(
+            Expectation(clause.name, clause.metric, clause.min, clause.max) for clause in content.expect
+        ),
+        source=text,
+        file=file,
+        nacelle=options.nacelle,
+        database=_beside(options.database, file),
+        automatic=automatic_settings(content.automatic),
+        pulses=pulses_of(content.pulses),
+        trial=trial_of(content.trial),
+    )
+
+
+def _start(table: StartTable, altitude: float) -> ProgrammePoint | None:
+    if table.condition is not None:
+        return named_start(table.condition, altitude=altitude)
+    if table.airspeed_kt is None or table.nacelle_deg is None:
+        return None
+    return ProgrammePoint(kt(table.airspeed_kt), deg(table.nacelle_deg), altitude)
+
+
+def _programme(table: ProgrammeTable, altitude: float) -> Programme:
+    points: list[tuple[PointTable, float]] = []
+    for point in table.points:
+        altitude = altitude if point.altitude_m is None else point.altitude_m
+        points.append((point, altitude))
+    if points[0][0].time_s is not None:
+        rows: list[tuple[Any, ...]] = [
+            (point.time_s, kt(point.airspeed_kt), deg(point.nacelle_deg), height) for point, height in points
+        ]
+        return Programme(*([row[column] for row in rows] for column in range(4)))  # type: ignore[arg-type]
+    return timed_programme(
+        [
+            Waypoint(
+                kt(point.airspeed_kt),
+                deg(point.nacelle_deg),
+                height,
+                acceleration=kt(point.acceleration_kt_s or table.acceleration_kt_s),
+                nacelle_rate=deg(point.nacelle_rate_deg_s or table.nacelle_rate_deg_s),
+                climb_rate=point.climb_rate_m_s or table.climb_rate_m_s,
+                hold=point.hold_s or 0.0,
+            )
+            for point, height in points
+        ],
+        nacelle_motion=table.nacelle_motion,
+    )

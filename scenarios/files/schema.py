@@ -1,0 +1,166 @@
+"""What a scenario file may say: the TOML layout as strict pydantic models.
+
+Every number has its unit in its key and its range here; unknown keys are errors. ``docs/scenarios.md`` explains the
+layout for people, ``scenarios.files.loader`` turns a checked file into a
+:class:`~scenarios.files.scenario.Scenario` in SI.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
+from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
+from scenarios.files.nacelle_laws import AutomaticTable, NacelleName
+from scenarios.files.scenario import AidName, CorridorName
+from scenarios.files.trial_schema import PulseTable, TrialTable
+
+FORMAT = 1
+"""Version of the layout; a file states it, so that later layouts can still read it."""
+
+AirspeedKt = Annotated[float, Field(ge=-40.0, le=260.0, allow_inf_nan=False)]
+NacelleDeg = Annotated[float, Field(ge=0.0, le=90.0, allow_inf_nan=False)]
+AltitudeM = Annotated[float, Field(ge=0.0, le=10_000.0, allow_inf_nan=False)]
+DurationS = Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
+AccelerationKtS = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
+NacelleRateDegS = Annotated[float, Field(ge=0.1, le=12.0, allow_inf_nan=False)]
+ClimbRateMS = Annotated[float, Field(ge=0.1, le=15.0, allow_inf_nan=False)]
+_PLUG_IN = r"[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?"
+PilotName = Annotated[str, Field(pattern=rf"^{_PLUG_IN}$", max_length=200)]
+ProtectionName = Annotated[str, Field(pattern=rf"^{_PLUG_IN}( *, *{_PLUG_IN})*$", max_length=1000)]
+"""Laws in the order in which they act: ``off``, ``monitor``, ``governor``, ``full``, entry points, MODULE:CLASS."""
+
+
+class Strict(BaseModel):
+    """A table of a scenario file: exact types, no unknown keys."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class FlightTable(Strict):
+    """``[flight]``: who flies what; the command line can override each of these."""
+
+    plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
+    outer_loop: Literal["integrators", "pi"] = "integrators"
+    pilot: PilotName = "mocm"
+    corridor: CorridorName | None = None
+    protection: ProtectionName = "monitor"
+    nacelle: NacelleName = "programme"
+    database: Annotated[str, Field(max_length=1000)] = ""
+    rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    wind_kt: Annotated[float, Field(ge=-40.0, le=40.0, allow_inf_nan=False)] = 0.0
+    pilot_noise: bool = False
+    aids: list[AidName] = []
+    automatic_flaps: bool = True
+    governor: bool = True
+
+
+class StartTable(Strict):
+    """``[start]``: the trimmed condition at frame 0; by default the programme's first point."""
+
+    condition: Literal["hover", "conversion", "cruise"] | None = None
+    airspeed_kt: AirspeedKt | None = None
+    nacelle_deg: NacelleDeg | None = None
+    altitude_m: AltitudeM | None = None
+
+
+class PointTable(Strict):
+    """One of ``[[programme.points]]``: where to be, and either when or how fast to get there."""
+
+    airspeed_kt: AirspeedKt
+    nacelle_deg: NacelleDeg
+    altitude_m: AltitudeM | None = None
+    time_s: DurationS | None = None
+    acceleration_kt_s: AccelerationKtS | None = None
+    nacelle_rate_deg_s: NacelleRateDegS | None = None
+    climb_rate_m_s: ClimbRateMS | None = None
+    hold_s: DurationS | None = None
+
+
+class ProgrammeTable(Strict):
+    """``[programme]``: the points, and the rates that hold for all of them."""
+
+    points: Annotated[list[PointTable], Field(min_length=1, max_length=10_000)]
+    nacelle_motion: Literal["spread", "rate"] = "spread"
+    acceleration_kt_s: AccelerationKtS = 3.0
+    nacelle_rate_deg_s: NacelleRateDegS = 3.0
+    climb_rate_m_s: ClimbRateMS = 2.0
+
+
+GustKt = Annotated[float, Field(ge=-60.0, le=60.0, allow_inf_nan=False)]
+
+
+class AirGustTable(Strict):
+    """One of ``[[air.gusts]]``: a discrete gust."""
+
+    time_s: DurationS
+    ahead_kt: GustKt = 0.0
+    below_kt: GustKt = 0.0
+    shape: GustShape = "one-minus-cosine"
+    duration_s: Annotated[float, Field(ge=0.0, le=3600.0, allow_inf_nan=False)] | None = None
+    length_m: Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)] | None = None
+    axes: GustAxes = "earth"
+
+
+class AirTable(Strict):
+    """``[air]``: turbulence and gusts; calm by default."""
+
+    turbulence: Severity | None = None
+    wind_at_20_ft_kt: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False)] | None = None
+    fade_in_s: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False)] = 2.0
+    minimum_speed_kt: Annotated[float, Field(ge=2.0, le=150.0, allow_inf_nan=False)] = 30.0
+    gusts: Annotated[list[AirGustTable], Field(max_length=1000)] = []
+
+
+class FaultTable(Strict):
+    """One of ``[[faults]]``: something fails, and perhaps mends."""
+
+    kind: FaultKind
+    time_s: DurationS
+    end_s: DurationS | None = None
+    actuator: Actuator | None = None
+    rate_deg_s: Annotated[float, Field(ge=0.0, le=200.0, allow_inf_nan=False)] | None = None
+    stop: Stop | None = None
+    bias_kt: Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)] | None = None
+    power_shp: Annotated[float, Field(ge=0.0, le=1802.0, allow_inf_nan=False)] | None = None
+    other_engine: EngineRating = "contingency"
+
+
+class EventTable(Strict):
+    """One of ``[[events]]``: something that happens at a time."""
+
+    time_s: DurationS
+    action: Literal["pilot"]
+    pilot: Literal["mocm", "hold", "external"]
+
+
+class ExpectTable(Strict):
+    """One of ``[[expect]]``: a metric of the flight and its limits; the unit is in the metric's name."""
+
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    metric: str
+    min: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    max: Annotated[float, Field(allow_inf_nan=False)] | None = None
+
+
+class ScenarioFile(Strict):
+    """A whole scenario file."""
+
+    format: Literal[1]
+    name: Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9_-]*$", max_length=100)]
+    title: Annotated[str, Field(min_length=1, max_length=200)]
+    description: str = ""
+    duration_s: Annotated[float, Field(gt=0.0, le=36_000.0, allow_inf_nan=False)] | None = None
+    flight: FlightTable = FlightTable()
+    start: StartTable = StartTable()
+    programme: ProgrammeTable | None = None
+    automatic: AutomaticTable | None = None
+    air: AirTable = AirTable()
+    faults: Annotated[list[FaultTable], Field(max_length=1000)] = []
+    pulses: Annotated[list[PulseTable], Field(max_length=1000)] = []
+    events: list[EventTable] = []
+    expect: list[ExpectTable] = []
+    trial: TrialTable | None = None

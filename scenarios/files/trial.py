@@ -1,0 +1,170 @@
+"""Tests of envelope protection as data: what a scenario's ``[trial]`` says, checked and in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rtsim.errors import InputError
+from rtsim.plugins import suggestion
+from rtsim.units import deg
+from scenarios.files.script import Pulse
+from scenarios.files.trial_schema import PulseTable, TrialTable
+
+TrialKind = Literal["nominal", "misuse", "failure", "unprotectable"]
+LARGEST_STICK, LARGEST_LEVER = 2.0, 1.0
+"""Largest amounts that mean something: from stop to stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrialClause:
+    """One expectation of a trial."""
+
+    name: str
+    """What is expected, in words."""
+    metric: str
+    """One of ``rtsim.measures.trial_metrics.TRIAL_METRICS``."""
+    of: Literal["law", "off", "difference"]
+    """Whose value: the protected flight's, its twin's, or the first minus the second."""
+    minimum: float | None
+    """Smallest value that holds."""
+    maximum: float | None
+    """Largest value that holds."""
+
+    def holds(self, value: float) -> bool:
+        """Whether a measured value meets the expectation.
+
+        Args:
+            value: In the unit of the metric's name.
+        """
+        low = self.minimum is None or value >= self.minimum
+        return low and (self.maximum is None or value <= self.maximum)
+
+    @property
+    def limit(self) -> str:
+        """What is allowed, such as ``<= 5`` or ``1 to 2``."""
+        if self.minimum is None:
+            return f"<= {self.maximum:g}"
+        return f">= {self.minimum:g}" if self.maximum is None else f"{self.minimum:g} to {self.maximum:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What makes a scenario a test of envelope protection."""
+
+    kind: TrialKind
+    """``nominal`` (a law has nothing to do), ``misuse``, ``failure``, or ``unprotectable`` (depth is bounded only)."""
+    law: str
+    """Law under test unless another is asked for."""
+    off_leaves: tuple[str, ...]
+    """What the unprotected twin must violate, else the test is vacuous."""
+    off_depth_kt: float
+    """How deep it must leave the corridor at least [kn]."""
+    no_harm_height: float
+    """Height the law may lose beyond what its twin lost [m]."""
+    clauses: tuple[TrialClause, ...]
+    """The scenario's own expectations."""
+
+
+def trial_problems(
+    pulses: Sequence[PulseTable], trial: TrialTable | None, *, has_events: bool, file: str
+) -> list[InputError]:
+    """Mistakes in ``[[pulses]]`` and ``[trial]`` that involve more than one key.
+
+    Args:
+        pulses: The script.
+        trial: The test, or None.
+        has_events: Whether the scenario hands the controls over.
+        file: The file, for the messages.
+    """
+    from rtsim.measures.trial_metrics import TRIAL_METRICS
+
+    found = []
+    for number, pulse in enumerate(pulses):
+        largest = {"stick": LARGEST_STICK, "lever": LARGEST_LEVER}.get(pulse.channel, 12.0)
+        if abs(pulse.amount) > largest:
+            found.append(
+                InputError(
+                    "is out of range",
+                    file=file,
+                    key=f"pulses[{number}].amount",
+                    value=pulse.amount,
+                    allowed=f"-{largest:g} to {largest:g} for the {pulse.channel}",
+                )
+            )
+        if pulse.replaces and pulse.channel == "switch":
+            key = f"pulses[{number}].replaces"
+            found.append(InputError("has no meaning for the switch", file=file, key=key, mend="delete it"))
+    if trial is None:
+        return found
+    if has_events:
+        found.append(InputError("cannot be flown as a trial", file=file, key="events", mend="delete events or [trial]"))
+    if trial.kind in {"misuse", "failure", "unprotectable"} and not trial.off_leaves:
+        found.append(
+            InputError(
+                "is missing",
+                file=file,
+                key="trial.off_leaves",
+                mend="say what the unprotected flight must violate, else the test may be vacuous",
+            )
+        )
+    if trial.kind == "nominal" and trial.off_leaves:
+        found.append(InputError("contradicts kind nominal", file=file, key="trial.off_leaves", mend="delete it"))
+    for number, clause in enumerate(trial.expect):
+        key = f"trial.expect[{number}]"
+        if clause.metric not in TRIAL_METRICS:
+            found.append(
+                InputError(
+                    "is not a metric of trials",
+                    file=file,
+                    key=f"{key}.metric",
+                    value=clause.metric,
+                    allowed=", ".join(TRIAL_METRICS),
+                    mend=suggestion(clause.metric, TRIAL_METRICS, otherwise="choose one"),
+                )
+            )
+        if clause.min is None and clause.max is None:
+            found.append(InputError("has no limit", file=file, key=key, mend="add min, max or both"))
+        elif clause.min is not None and clause.max is not None and clause.min > clause.max:
+            key = f"{key}.min"
+            found.append(InputError("is larger than max", file=file, key=key, value=clause.min, mend="swap them"))
+    return found
+
+
+def trial_of(table: TrialTable | None) -> Trial | None:
+    """Bring a checked ``[trial]`` to its form in the program.
+
+    Args:
+        table: From a scenario file, without contradictions.
+    """
+    if table is None:
+        return None
+    return Trial(
+        kind=table.kind,
+        law=table.law,
+        off_leaves=tuple(table.off_leaves),
+        off_depth_kt=table.off_depth_kt,
+        no_harm_height=table.no_harm_height_m,
+        clauses=tuple(TrialClause(item.name, item.metric, item.of, item.min, item.max) for item in table.expect),
+    )
+
+
+def pulses_of(tables: Sequence[PulseTable]) -> tuple[Pulse, ...]:
+    """Bring checked pulses to SI.
+
+    Args:
+        tables: From a scenario file, without contradictions.
+    """
+    return tuple(
+        Pulse(
+            channel=table.channel,
+            start=table.time_s,
+            duration=table.duration_s,
+            amount=deg(table.amount) if table.channel == "switch" else table.amount,
+            shape=table.shape,
+            period=table.period_s,
+            replaces=table.replaces,
+        )
+        for table in tables
+    )

@@ -1,0 +1,1 @@
+"""One flight: composed, flown live or as fast as it goes, recorded, replayed."""

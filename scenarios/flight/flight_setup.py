@@ -1,0 +1,139 @@
+"""What a scenario means to the simulation, and how that is kept for a replay: setup, frames, outline, versions."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import platform
+import sys
+from typing import Any, get_type_hints
+
+from pydantic import TypeAdapter
+
+import rtsim
+from rtsim.loop.simulation import FlightSetup
+from rtsim.lpv.files.storage import load_database
+from rtsim.programme import Programme
+from rtsim.protection import load_boundary
+from rtsim.units import to_deg, to_kt
+from scenarios.files.nacelle_laws import automatic_nacelle
+from scenarios.files.scenario import Scenario
+from scenarios.flight.pilots import load_pilot
+from telemetry.view.corridor_outline import CorridorOutline
+
+
+def flight_frames(scenario: Scenario) -> int:
+    """Frames of a flight: the last one starts before its end.
+
+    Args:
+        scenario: What is flown.
+    """
+    return max(1, math.ceil(scenario.duration * scenario.rate_hz - 1e-6))
+
+
+def flight_setup(scenario: Scenario) -> FlightSetup:
+    """What the simulation needs to know of a scenario.
+
+    Args:
+        scenario: What is flown.
+    """
+    return FlightSetup(
+        programme=scenario.programme,
+        plant=scenario.plant,
+        outer_loop=scenario.outer_loop,
+        pilot="mocm" if load_pilot(scenario.pilot) is None else "external",
+        corridor=scenario.corridor_name,
+        rate_hz=scenario.rate_hz,
+        start_airspeed=scenario.start.airspeed,
+        start_nacelle=scenario.start.nacelle_angle,
+        start_altitude=scenario.start.altitude,
+        wind=scenario.wind,
+        seed=scenario.seed,
+        pilot_noise=scenario.pilot_noise,
+        aids=scenario.aids,
+        automatic_flaps=scenario.automatic_flaps,
+        governor=scenario.governor,
+        air=scenario.air,
+        faults=scenario.faults,
+        automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),
+        protection=scenario.protection,
+        protection_boundary=scenario.corridor_name,
+        database=scenario.database,
+    )
+
+
+def corridor_outline(name: str, database: str = "") -> CorridorOutline:
+    """The boundaries of a corridor as plain arrays, for views and logs.
+
+    Args:
+        name: ``design``, ``flight`` or ``model``.
+        database: LPV database that ``model`` is computed from, a file; empty: the shipped XV-15.
+    """
+    corridor = load_boundary(name, load_database(database) if database and name == "model" else None)
+    high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
+    high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
+    high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]
+    low = [(to_deg(float(n)), to_kt(float(v))) for n, v in zip(corridor.low.nacelle, corridor.low.speed, strict=True)]
+    corners = sorted({*high_nacelle, *(float(n) for n in corridor.low.nacelle)})
+    centre = [(to_deg(angle), to_kt(float(corridor.centre_speed(angle)))) for angle in corners]
+    lines = [tuple(zip(*line, strict=True)) for line in (low, high, centre)]
+    return CorridorOutline.from_lines(name, low=lines[0], high=lines[1], centre=lines[2])
+
+
+def replay_setup(scenario: Scenario) -> dict[str, Any]:
+    """Everything a replay must know besides commands and events, as JSON values that read back exactly.
+
+    Args:
+        scenario: What is flown.
+    """
+    return {
+        "flight": setup_to_json(flight_setup(scenario)),
+        "pilot_name": scenario.pilot,
+        "protection": scenario.protection,
+    }
+
+
+def setup_to_json(setup: FlightSetup) -> dict[str, Any]:
+    """A flight setup as JSON values: every field, since defaults may change between versions.
+
+    Args:
+        setup: What flies, how and from where.
+    """
+    values: dict[str, Any] = {"programme": setup.programme.to_dict()}
+    for field in dataclasses.fields(setup):
+        if field.name != "programme":
+            values[field.name] = _json_form(field.name).dump_python(getattr(setup, field.name), mode="json")
+    return values
+
+
+def setup_from_json(values: dict[str, Any]) -> FlightSetup:
+    """Read back what :func:`setup_to_json` wrote.
+
+    Args:
+        values: The JSON values.
+    """
+    read: dict[str, Any] = {
+        name: Programme.from_dict(value) if name == "programme" else _json_form(name).validate_python(value)
+        for name, value in values.items()
+    }
+    return FlightSetup(**read)
+
+
+def _json_form(name: str) -> TypeAdapter[Any]:
+    """How a field of the setup is written to JSON and read back, from its type."""
+    return TypeAdapter(get_type_hints(FlightSetup)[name])
+
+
+def versions() -> dict[str, str]:
+    """Versions and machine type that a history hash is promised for."""
+    import numba
+    import numpy as np
+
+    return {
+        "rtsim": rtsim.__version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "machine": f"{platform.system()} {platform.machine()}",
+        "byteorder": sys.byteorder,
+    }

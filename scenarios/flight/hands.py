@@ -1,0 +1,231 @@
+"""A person's hands in a flight: sticks and requests from MAVLink become commands, switches and hand-overs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol, get_args
+
+from rtsim.aids import SWITCHES, SwitchName
+from rtsim.aids.aids_kernels import MAP_STICK, scheduled
+from rtsim.command import Command
+from rtsim.frame import COLUMN, FloatArray
+from rtsim.loop.simulation import PilotMode, Simulation
+from rtsim.protection import load_boundary
+from rtsim.realtime import FlightControl, SwitchedFlight
+from rtsim.sticks import INPUT_LIVE, INPUT_NONE, StickHandler, StickSettings, StickSituation, transition_schedule
+from rtsim.units import KNOT, deg
+from telemetry.mavlink import Feedback, MavlinkLink, Request
+
+_WATCH_FRAMES = 64
+
+
+class HandedFlight(SwitchedFlight, Protocol):
+    """What the hands need of the flight they are in."""
+
+    @property
+    def simulation(self) -> Simulation:
+        """What flies."""
+        ...
+
+    def tell(self, kind: str, text: str) -> None:
+        """Make an event that changes nothing.
+
+        Args:
+            kind: One word, for programs.
+            text: One line, for people.
+        """
+        ...
+
+
+class Hands:
+    """Connects one flight to its ground stations, once per frame."""
+
+    def __init__(self, link: MavlinkLink, simulation: Simulation, *, control: FlightControl, waits: bool) -> None:
+        """Prepare.
+
+        Args:
+            link: The MAVLink process.
+            simulation: What flies, at its start.
+            control: The hand on the flight, for reset and pause.
+            waits: Whether the first sticks that arrive take the controls over.
+        """
+        self._link, self._control = link, control
+        self._settings = StickSettings()
+        for name, value in link.config.parameters.items():
+            self._settings = self._settings.with_parameter(name, value)
+        self._schedule = transition_schedule(load_boundary(simulation.setup.corridor))
+        self._waits = waits
+        self._deferred: list[Request] = []
+        self._frames = 0
+        self._waiting = waits
+        self._begin(simulation)
+        control.poll = self.idle
+
+    def before(self, flight: HandedFlight) -> Command | None:
+        """Serve requests and give the command of the coming frame.
+
+        Args:
+            flight: The flight; its pilot and aids may be switched.
+
+        Returns:
+            The hands' command where they fly, else None.
+        """
+        requests = self._link.input.requests()
+        if requests or self._deferred:
+            pending, self._deferred = [*self._deferred, *requests], []
+            resets = False
+            for request in pending:
+                resets = resets or request.kind == "reset"
+                if resets and request.kind not in {"reset", "freeze"}:
+                    self._deferred.append(request)  # the reset comes before the next frame and would undo it
+                else:
+                    self._serve(request, flight)
+        sticks, age = self._link.input.read(), self._link.input.age()
+        fresh = sticks.sequence > 0 and age <= self._settings.loss_time
+        simulation = flight.simulation
+        if self._waiting and fresh and (sticks.stick_valid or sticks.lever_valid):
+            self._waiting = False
+            if simulation.mode != "external":
+                flight.switch_pilot("external")
+        command = None
+        if simulation.mode == "external":
+            situation = StickSituation(self._airspeed, self._angle, self._trim_stick(simulation))
+            command = self._handler.step(sticks, age=age, situation=situation, dt=simulation.dt)
+            state = self._handler.state
+        else:
+            state = INPUT_LIVE if fresh else INPUT_NONE
+        handler = self._handler
+        self._link.report(
+            Feedback(
+                handler.stick,
+                handler.lever,
+                sticks.lateral if fresh else 0.0,
+                sticks.yaw if fresh else 0.0,
+                float(handler.nacelle_switch),
+                self._angle,
+                float(state),
+                self._link.input.first_use_age,
+                self._aid_bits(simulation.aids),
+                float(handler.transition),
+            )
+        )
+        return command
+
+    def after(self, row: FloatArray, dt: float) -> None:
+        """Look at the frame that was flown.
+
+        Args:
+            row: Its row.
+            dt: Length of a frame [s].
+        """
+        # The command angle of the actuator at the start of the coming frame.
+        self._angle = deg(row[COLUMN.nacelle_reference_deg] + row[COLUMN.nacelle_command_rate_deg_s] * dt)
+        self._airspeed = row[COLUMN.airspeed_kt] * KNOT
+        self._acting = (row[COLUMN.stick], row[COLUMN.lever])
+        self._frames += 1
+        if self._frames % _WATCH_FRAMES == 0:
+            self._link.watch()
+
+    def idle(self) -> None:
+        """Hear requests while the flight stands still; called by the executive."""
+        for request in self._link.input.requests():
+            if request.kind == "freeze":
+                self._control.toggle_pause()
+            elif request.kind == "reset":
+                self._deferred.clear()  # asked for before it
+                self._control.reset()
+            else:
+                self._deferred.append(request)
+        self._link.watch()
+
+    def engage(self) -> None:
+        """The hands take over in the coming frame."""
+        self._waiting = False
+        self._handler.engage(Command(float(self._acting[0]), float(self._acting[1]), 0.0))
+
+    def reset(self, simulation: Simulation) -> None:
+        """The flight starts again; the hands wait for sticks as at the first start.
+
+        Args:
+            simulation: What flies, at its start.
+        """
+        self._begin(simulation)
+
+    def summary(self) -> dict[str, Any]:
+        """What passed, as the ``mavlink`` entry of ``rtsim fly --json``."""
+        ages = self._link.input.ages()
+        age_ms = None if ages is None else {"p50": ages.p50_ms, "p99": ages.p99_ms, "max": ages.max_ms}
+        return {"port": self._link.port, "input_age_ms": age_ms, **self._link.counters()}
+
+    def _begin(self, simulation: Simulation) -> None:
+        command = simulation.pilot_command()
+        self._acting = (command.stick, command.lever)
+        self._handler = StickHandler(self._settings, start=Command(0.0, command.lever, 0.0), schedule=self._schedule)
+        sensors = simulation.sensors()
+        self._angle, self._airspeed = sensors.nacelle_angle, sensors.airspeed
+        self._waiting = self._waits
+        self._known_aids: tuple[SwitchName, ...] | None = None
+        self._bits = 0.0
+
+    def _serve(self, request: Request, flight: HandedFlight) -> None:
+        kind = request.kind
+        if kind == "freeze":
+            self._control.toggle_pause()
+        elif kind == "reset":
+            self._control.reset()
+        elif kind == "pilot":
+            self._waiting = False
+            if request.name != flight.simulation.mode:
+                flight.switch_pilot(request.name)
+        elif kind in {"aid", "flaps", "throttle"}:
+            _switch(request, flight)
+        elif kind == "parameter":
+            self._settings = self._settings.with_parameter(request.name, request.value)
+            self._handler.change(self._settings)
+            flight.tell("parameter", f"{request.name} = {request.value:g}")
+        elif kind in {"nacelle", "transition"}:
+            if flight.simulation.mode != "external":
+                flight.switch_pilot("external")
+            if kind == "nacelle":
+                self._handler.go_to(request.value)
+            else:
+                self._handler.start_transition(int(request.value))
+
+    def _trim_stick(self, simulation: Simulation) -> float:
+        """Stick that trims with the hands off: none where the bias schedule supplies it."""
+        if "trim_bias" in simulation.aids:
+            return 0.0
+        return float(scheduled(simulation.tables.aids, MAP_STICK, self._airspeed, self._angle))
+
+    def _aid_bits(self, aids: tuple[SwitchName, ...]) -> float:
+        if aids != self._known_aids:
+            self._known_aids = aids
+            self._bits = float(sum(1 << place for place, name in enumerate(SWITCHES) if name in aids))
+        return self._bits
+
+
+def _switch(request: Request, flight: HandedFlight) -> None:
+    """Serve a request for an aid, the flaps or the throttle."""
+    if request.kind == "throttle":
+        flight.trim_throttle(request.value)
+    elif request.kind == "flaps":
+        steps = {"up": -1, "down": 1}
+        if request.name in steps:
+            flight.step_flaps(steps[request.name])
+        else:
+            flight.set_flaps(request.value)
+    elif request.name in SWITCHES:
+        on = request.name in flight.simulation.aids
+        if request.value == 2.0 or (request.value == 1.0) != on:
+            flight.switch_aid(request.name, on=not on)
+
+
+def pilot_modes(*, plug_in: bool, hands: bool) -> Sequence[PilotMode]:
+    """Who can fly a flight.
+
+    Args:
+        plug_in: It has a pilot plug-in.
+        hands: Somebody may hold the sticks.
+    """
+    everybody: tuple[PilotMode, ...] = get_args(PilotMode)
+    return everybody if plug_in or hands else tuple(mode for mode in everybody if mode != "external")

@@ -1,0 +1,133 @@
+"""How a flight talks MAVLink: what the user may choose, checked and turned into the vehicle's settings."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import rtsim
+from rtsim.aids import SWITCHES
+from rtsim.errors import InputError
+from rtsim.sticks import StickSettings
+from rtsim.units import deg
+from scenarios.flight.pilots import HAND_PILOT
+from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
+from telemetry.mavlink import HomePosition, MavlinkConfig
+from telemetry.mavlink.config import endpoints
+
+if TYPE_CHECKING:
+    from scenarios.files.scenario import Scenario
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MavlinkOptions:
+    """How a flight talks MAVLink."""
+
+    targets: tuple[str, ...] = ()
+    """``HOST:PORT`` of ground stations; empty takes 127.0.0.1:14550."""
+    bind: str | None = None
+    """``HOST:PORT`` to receive on; None takes a free loopback port."""
+    allow_network: bool = False
+    """Whether MAVLink may leave this machine."""
+    signing_key: Path | None = None
+    """File with the signing key."""
+    parameter_file: Path | None = None
+    """Where parameters are stored on request; None takes the user's own place."""
+    stick_map: str | None = None
+    """Stick map of the vehicle: a library name or a file."""
+    autopilot: Literal["px4", "generic"] = "px4"
+    """How ground stations decode modes."""
+    reboot_resets: bool = False
+    """Let the reboot command reset the flight."""
+    home: HomePosition = field(default_factory=HomePosition)
+    """Start of the flight on the globe."""
+
+
+def default_parameter_file() -> Path:
+    """Where parameters are stored where nothing else is said: the user's configuration directory."""
+    base = os.environ.get("XDG_CONFIG_HOME")
+    return (Path(base) if base else Path.home() / ".config") / "rtsim" / "mavlink_parameters.toml"
+
+
+def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[MavlinkConfig, str | None]:
+    """Settings of the vehicle of a flight.
+
+    Args:
+        options: What the user wants.
+        scenario: What is flown.
+
+    Returns:
+        The settings, and a warning to print or None.
+
+    Raises:
+        InputError: An address, the key or the stick map is wrong.
+    """
+    targets, host, port, warning = endpoints(options.targets, allow_network=options.allow_network, bind=options.bind)
+    stick_map = load_vehicle_map(options.stick_map)
+    parameter_file = options.parameter_file or default_parameter_file()
+    always = {"automatic_flaps": scenario.automatic_flaps, "governor": scenario.governor}
+    aids_on = {*scenario.aids, *(name for name, on in always.items() if on)}
+    config = MavlinkConfig(
+        targets=targets,
+        bind_host=host,
+        bind_port=port,
+        autopilot=options.autopilot,
+        rate_hz=float(scenario.rate_hz),
+        home=options.home,
+        aids={name: name in aids_on for name in SWITCHES},
+        parameters=stick_settings(stick_map).parameters(),
+        parameter_file=str(parameter_file),
+        axes={str(control): source for control, source in stick_map.axes.items()},
+        buttons={str(function): bit for function, bit in stick_map.buttons.items()},
+        signing_key_file=str(options.signing_key) if options.signing_key else None,
+        reboot_resets=options.reboot_resets,
+        title=scenario.name,
+        version=rtsim.__version__,
+    )
+    return config, warning
+
+
+def stick_settings(stick_map: VehicleMap) -> StickSettings:
+    """Shaping and nacelle switch of a stick map.
+
+    Args:
+        stick_map: The map.
+    """
+    return StickSettings(
+        dead_band=stick_map.shape.dead_band,
+        expo=stick_map.shape.expo,
+        scale=stick_map.shape.scale,
+        detents=stick_map.nacelle.detents,
+        nacelle_rate=deg(stick_map.nacelle.rate_deg_s),
+    )
+
+
+def flown_by_hand(pilot: str) -> bool:
+    """Whether a scenario's pilot is a person behind MAVLink.
+
+    Args:
+        pilot: Name of the pilot.
+    """
+    return pilot == HAND_PILOT
+
+
+def refuse_unpaced(scenario: Scenario, *, paced: bool) -> None:
+    """Refuse MAVLink in a flight that is flown as fast as it goes: nobody could follow it.
+
+    Args:
+        scenario: What is flown.
+        paced: Whether the flight is paced.
+
+    Raises:
+        InputError: It is not.
+    """
+    if not paced:
+        raise InputError(
+            "MAVLink needs a paced flight",
+            key="--speed",
+            value="max",
+            allowed="multiples of real time",
+            mend="leave --speed out" if flown_by_hand(scenario.pilot) else "leave --mavlink out",
+        )

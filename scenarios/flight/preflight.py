@@ -1,0 +1,91 @@
+"""What would keep a scenario that reads well from being flown: pilots, laws and a start that are not there."""
+
+from __future__ import annotations
+
+import tomllib
+
+from rtsim.errors import InputError, RtsimError
+from rtsim.units import to_deg, to_kt
+from scenarios.files.nacelle_laws import load_nacelle_law
+from scenarios.files.scenario import START_CONDITIONS, Scenario
+from scenarios.flight.hands import pilot_modes
+from scenarios.flight.mavlink_options import flown_by_hand
+from scenarios.flight.pilots import BUILT_IN_PILOT, load_pilot
+
+
+def preflight_problems(scenario: Scenario) -> list[InputError]:
+    """Names in a scenario behind which there is nothing; an empty list where all can be found.
+
+    Args:
+        scenario: What is to be flown. Modules of MODULE:CLASS are imported.
+    """
+    from rtsim.protection.laws import load_laws
+
+    found = []
+    for key, look_up in (("pilot", load_pilot), ("nacelle", load_nacelle_law), ("protection", load_laws)):
+        try:
+            look_up(getattr(scenario, key))
+        except InputError as error:
+            found.append(_placed(error, scenario, key))
+    plug_in = scenario.pilot != BUILT_IN_PILOT
+    available = pilot_modes(plug_in=plug_in, hands=flown_by_hand(scenario.pilot))
+    for number, event in enumerate(scenario.events):
+        if event.pilot not in available:
+            found.append(
+                InputError(
+                    "is not a pilot of this flight",
+                    file=scenario.file,
+                    key=f"events[{number}].pilot",
+                    value=event.pilot,
+                    allowed=", ".join(available),
+                    mend="choose one, or name a plug-in as flight.pilot or by --pilot",
+                )
+            )
+    return found
+
+
+def start_problems(scenario: Scenario) -> list[InputError]:
+    """Whether the aircraft can be trimmed where a scenario starts; an empty list where it can.
+
+    Args:
+        scenario: What is to be flown.
+    """
+    start = scenario.start
+    if (start.airspeed, start.nacelle_angle) in START_CONDITIONS.values():
+        return []
+    from rtsim.lpv.aircraft import load_aircraft
+
+    try:
+        trimmed = (
+            load_aircraft(scenario.database or None)
+            .trim(airspeed=start.airspeed, nacelle=start.nacelle_angle)
+            .converged
+        )
+    except RtsimError:
+        trimmed = False
+    if trimmed:
+        return []
+    return [
+        InputError(
+            "the aircraft has no level-flight trim there",
+            file=scenario.file,
+            key="start",
+            value=f"{to_kt(start.airspeed):g} kn at nacelle {to_deg(start.nacelle_angle):g} deg",
+            mend="start inside the conversion corridor (rtsim corridor shows it)",
+        )
+    ]
+
+
+def _placed(error: InputError, scenario: Scenario, key: str) -> InputError:
+    """The error where its value stands: in the scenario's file, or else on the command line."""
+    table = tomllib.loads(scenario.source).get("flight", {}) if scenario.source else {}
+    if table.get(key) != getattr(scenario, key):
+        return error
+    return InputError(
+        error.problem,
+        file=scenario.file,
+        key=f"flight.{key}",
+        value=error.value,
+        allowed=error.allowed,
+        mend=error.mend,
+    )

@@ -1,0 +1,297 @@
+"""Flies scenarios: composes simulation, pilot, log and view, lets the executive pace them, and measures the result."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from rtsim.errors import OutputError
+from rtsim.frame import FloatArray, history_sha256
+from rtsim.loop.simulation import Simulation
+from rtsim.measures.metrics import flight_metrics
+from rtsim.realtime import Executive, FlightControl, OverrunPolicy
+from rtsim.realtime.control import checked_speed
+from rtsim.realtime.report import TimingReport
+from scenarios.files.loader import load_scenario
+from scenarios.files.nacelle_laws import load_nacelle_law
+from scenarios.files.options import Overrides, with_overrides
+from scenarios.files.scenario import Scenario
+from scenarios.flight.flight_setup import corridor_outline, flight_frames, flight_setup, replay_setup, versions
+from scenarios.flight.hands import Hands
+from scenarios.flight.limit_watch import LimitWatch
+from scenarios.flight.mavlink_options import MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced
+from scenarios.flight.pilots import load_pilot
+from scenarios.flight.preflight import preflight_problems
+from scenarios.flight.result import FlightRecord, judge
+from scenarios.flight.script_hands import ScriptHands
+from scenarios.flight.session import FlightSession
+from scenarios.flight.sinks import FlightSinks
+from telemetry.log.format import FlightMetadata, LogEvent
+
+if TYPE_CHECKING:
+    from telemetry.log.recorder import Recorder
+    from telemetry.mavlink import MavlinkLink
+    from telemetry.view.options import ViewOptions
+    from telemetry.view.view import RerunView
+
+TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "advice", "end"})
+"""Events that ground stations are told of as text."""
+VIEW_PATIENCE_S = 1.5
+"""How long the first frame waits for a view that is starting [s]; the flight begins without it after that."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOutputs:
+    """What a flight leaves behind or shows besides its record."""
+
+    log: Path | None = None
+    """Flight log to write, a directory (``PATH.parquet``)."""
+    overwrite: bool = False
+    """Replace an earlier log at that path."""
+    view: ViewOptions | None = None
+    """Rerun view and recording; None shows nothing."""
+    mavlink: MavlinkOptions | None = None
+    """Ground stations; None talks no MAVLink, unless the pilot is behind it."""
+    on_message: Callable[[str], None] | None = None
+    """Told what the view has to say, one sentence at a time."""
+    on_rows: Callable[[FloatArray], None] | None = None
+    """Told the last row flown; must be quick."""
+    on_event: Callable[[LogEvent], None] | None = None
+    """Told every event; must be quick."""
+    on_start: Callable[[], None] | None = None
+    """Called when everything is warm, just before the first frame."""
+
+
+def fly(
+    scenario: str | Path | Scenario = "typical_conversion",
+    *,
+    speed: float | Literal["max"] = 1.0,
+    overrides: Overrides | None = None,
+    control: FlightControl | None = None,
+    overrun_policy: str = "catch-up",
+    outputs: FlightOutputs | None = None,
+) -> FlightRecord:
+    """Fly a scenario to its end.
+
+    Args:
+        scenario: A library name, a path, or a scenario already loaded.
+        speed: Multiple of real time, or ``max``.
+        overrides: What to change of the scenario.
+        control: The hand on the flight (pause, step, warp, reset, pilot, stop), usable from another thread.
+        overrun_policy: ``catch-up`` or ``stop:N``.
+        outputs: Log, view and callbacks.
+
+    Returns:
+        The flight; ``failure`` tells whether a log or recording broke on the way.
+
+    Raises:
+        InputError: If something that was asked for does not exist or cannot be flown.
+        OutputError: If a log or recording cannot be started.
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    if overrides is not None:
+        scenario = with_overrides(scenario, overrides)
+    for problem in preflight_problems(scenario):
+        raise problem
+    if speed != "max":
+        checked_speed(speed)
+    policy = OverrunPolicy.parse(overrun_policy)
+    outputs = outputs if outputs is not None else FlightOutputs()
+    pilot_factory = load_pilot(scenario.pilot)
+    nacelle_law = load_nacelle_law(scenario.nacelle)
+    live = speed != "max"
+    control = control if control is not None else FlightControl()
+    link: MavlinkLink | None = None
+    log: Recorder | None = None
+    # The view needs a second to start, in its own process, while this one loads the aircraft.
+    view = _start_view(scenario, outputs)
+    try:
+        link = _start_mavlink(scenario, outputs, live=live)
+        simulation = Simulation(flight_setup(scenario))
+        waits = flown_by_hand(scenario.pilot)
+        hands = Hands(link, simulation, control=control, waits=waits) if link is not None else None
+        session = FlightSession(
+            simulation,
+            frames=flight_frames(scenario),
+            events=scenario.events,
+            pilot_factory=pilot_factory,
+            pilot_name=scenario.pilot,
+            hands=hands,
+            nacelle_law=nacelle_law,
+            script=ScriptHands(scenario.pulses) if scenario.pulses else None,
+        )
+        log = _start_log(scenario, simulation, outputs, live=live)
+        sinks = FlightSinks(
+            log=log,
+            view=view,
+            mirror=link,
+            watch_corridor=scenario.protection != "off",
+            limits=_limit_watch(scenario, simulation.dt),
+            on_rows=outputs.on_rows,
+            on_event=_event_listener(outputs, link),
+        )
+        session.on_event = sinks.event
+        simulation.warm_up()
+        if simulation.laws is not None:
+            simulation.laws.live, simulation.laws.on_event = live, session.law_event
+        if view is not None and live:
+            view.wait_ready(VIEW_PATIENCE_S)
+        if link is not None:
+            link.wait_ready()
+            _tell_where(link, outputs)
+        executive = Executive(
+            session, sinks, control=control, speed=math.inf if speed == "max" else speed, policy=policy
+        )
+        if outputs.on_start is not None:
+            outputs.on_start()
+        timing = executive.fly()
+        record = _measure(scenario, session, sinks, timing, simulation.database_hash)
+        if hands is not None:
+            record = dataclasses.replace(record, mavlink=hands.summary())
+    except BaseException:
+        _close(log, view, None)
+        _close_mavlink(link)
+        raise
+    link_failure = _close_mavlink(link)
+    return dataclasses.replace(record, failure=_close(log, view, record) or link_failure)
+
+
+def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
+    if outputs.view is None:
+        return None
+    from telemetry.view.view import RerunView
+
+    return RerunView(
+        outputs.view,
+        corridor=corridor_outline(scenario.corridor_name, scenario.database),
+        title=scenario.name,
+        rate_hz=scenario.rate_hz,
+        on_message=outputs.on_message,
+    )
+
+
+def _start_mavlink(scenario: Scenario, outputs: FlightOutputs, *, live: bool) -> MavlinkLink | None:
+    """Put the aircraft on the air, in a process that gets ready while this one loads it."""
+    if outputs.mavlink is None and not flown_by_hand(scenario.pilot):
+        return None
+    refuse_unpaced(scenario, paced=live)
+    from telemetry.mavlink import MavlinkLink
+
+    config, warning = mavlink_config(outputs.mavlink or MavlinkOptions(), scenario)
+    if warning is not None and outputs.on_message is not None:
+        outputs.on_message(warning)
+    return MavlinkLink(config)
+
+
+def _tell_where(link: MavlinkLink, outputs: FlightOutputs) -> None:
+    if outputs.on_message is not None:
+        targets = ", ".join(str(target) for target in link.config.targets)
+        outputs.on_message(f"MAVLink: sends to {targets}, receives on {link.config.bind_host}:{link.port}.")
+
+
+def _event_listener(outputs: FlightOutputs, link: MavlinkLink | None) -> Callable[[LogEvent], None] | None:
+    """Who hears of events: the caller, and the ground stations of what they cannot see in the rows."""
+    heard = outputs.on_event
+    if link is None:
+        return heard
+
+    def tell(event: LogEvent) -> None:
+        if event.kind in TOLD_TO_STATIONS:
+            link.say(event.text, severity=4 if event.level == "warning" else 6)
+        if heard is not None:
+            heard(event)
+
+    return tell
+
+
+def _close_mavlink(link: MavlinkLink | None) -> OutputError | None:
+    if link is None:
+        return None
+    link.close()
+    return link.failure
+
+
+def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutputs, *, live: bool) -> Recorder | None:
+    if outputs.log is None:
+        return None
+    from telemetry.log.recorder import Recorder
+
+    metadata = FlightMetadata(
+        scenario_name=scenario.name,
+        scenario_toml=scenario.source,
+        database_hash=simulation.database_hash,
+        seed=scenario.seed,
+        rate_hz=float(scenario.rate_hz),
+        versions=versions(),
+        setup=replay_setup(scenario),
+        corridor=corridor_outline(scenario.corridor_name, scenario.database),
+    )
+    return Recorder(outputs.log, metadata, live=live, overwrite=outputs.overwrite)
+
+
+def _measure(
+    scenario: Scenario, session: FlightSession, sinks: FlightSinks, timing: TimingReport, database_hash: str
+) -> FlightRecord:
+    rows = sinks.history.rows()
+    metrics = flight_metrics(rows, scenario.programme, session.dt) if len(rows) else None
+    completed = session.completed and timing.ending == "finished"
+    watched = sinks.watched()
+    last = int(rows[-1, 0]) + 1 if len(rows) else 0
+    sinks.event(LogEvent(last, last * session.dt, "end", timing.end_reason, "info" if completed else "warning"))
+    return FlightRecord(
+        scenario=scenario,
+        rows=rows,
+        metrics=metrics,
+        timing=timing,
+        events=tuple(sinks.events),
+        completed=completed,
+        end_reason=timing.end_reason,
+        history_sha256=history_sha256([rows]),
+        # A flight that was stopped by hand has not failed what it was never flown to.
+        verdicts=()
+        if timing.ending == "stopped"
+        else judge(scenario, metrics, completed=completed, end_reason=timing.end_reason),
+        database_hash=database_hash,
+        watched=watched,
+    )
+
+
+def _limit_watch(scenario: Scenario, dt: float) -> Callable[[Callable[[LogEvent], None]], LimitWatch] | None:
+    """What watches the flight's limits; nothing with the protection off."""
+    if scenario.protection == "off":
+        return None
+    return functools.partial(LimitWatch, scenario.corridor_name, dt=dt, database=scenario.database)
+
+
+def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | None) -> OutputError | None:
+    """Close log and view whatever happened; the first that failed is reported."""
+    failure: OutputError | None = None
+    if log is not None:
+        try:
+            log.close(_log_summary(record) if record is not None else None)
+        except OutputError as error:
+            failure = error
+    if view is not None:
+        view.close()
+        failure = failure or view.failure
+    return failure
+
+
+def _log_summary(record: FlightRecord) -> dict[str, Any]:
+    """The end of a log: the record's summary with its wall clock."""
+    return {**_without_nan(record.summary()), "ended_unix_s": time.time()}
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,302 @@
+"""Where the rows of a flight go: the history in memory, the log, the view; and the corridor's events."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from rtsim.corridor import LEVEL_NAMES
+from rtsim.errors import OutputError
+from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
+from telemetry.log.format import LogEvent
+
+if TYPE_CHECKING:
+    from scenarios.flight.limit_watch import LimitWatch
+
+_CHUNK = 4096
+_VIEW_PIECE = 64
+_VIEW_BACKLOG = 1024
+_DROPPED = [signal.name for signal in TIMING_SIGNALS].index("telemetry_dropped")
+
+
+class RowLog(Protocol):
+    """What the recorder offers to a flight."""
+
+    @property
+    def failure(self) -> OutputError | None:
+        """Why the log stopped growing, once it has."""
+        ...
+
+    def push(self, row: FloatArray, timing: FloatArray | None = None) -> None:
+        """Keep one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Its timing columns; None where the flight is not paced.
+        """
+        ...
+
+    def push_block(self, rows: FloatArray) -> None:
+        """Keep many rows.
+
+        Args:
+            rows: The frames, shape (frames, SIGNAL_COUNT).
+        """
+        ...
+
+    def event(self, event: LogEvent) -> None:
+        """Keep an event.
+
+        Args:
+            event: What happened.
+        """
+        ...
+
+
+class RowView(Protocol):
+    """What a view offers to a flight; nothing of it may wait."""
+
+    @property
+    def dropped(self) -> int:
+        """Rows the view was too slow to take."""
+        ...
+
+    def push(self, row: FloatArray, timing: FloatArray) -> None:
+        """Show one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Timing columns of the frame before.
+        """
+        ...
+
+    @property
+    def backlog(self) -> int:
+        """Rows pushed that the view has not taken yet."""
+        ...
+
+    @property
+    def alive(self) -> bool:
+        """Whether anything takes the rows."""
+        ...
+
+    def watch(self) -> None:
+        """Look after the view."""
+        ...
+
+    def event(self, text: str, level: str = "info") -> None:
+        """Show an event.
+
+        Args:
+            text: What happened.
+            level: ``info``, ``caution``, ``warning`` or ``exceedance``.
+        """
+        ...
+
+
+class RowMirror(Protocol):
+    """Whatever else is shown every row of a paced flight; nothing of it may wait."""
+
+    def push(self, row: FloatArray, timing: FloatArray) -> None:
+        """Show one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Timing columns of the frame before.
+        """
+        ...
+
+
+class History:
+    """All rows of a flight, kept in chunks."""
+
+    def __init__(self) -> None:
+        self.chunks: list[FloatArray] = []
+        """Full chunks."""
+        self._current = np.empty((_CHUNK, SIGNAL_COUNT))
+        self._fill = 0
+
+    def append(self, row: FloatArray) -> None:
+        """Keep one row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,); it is copied.
+        """
+        self._current[self._fill] = row
+        self._fill += 1
+        if self._fill == _CHUNK:
+            self.chunks.append(self._current)
+            self._current, self._fill = np.empty((_CHUNK, SIGNAL_COUNT)), 0
+
+    def extend(self, rows: FloatArray) -> None:
+        """Keep many rows.
+
+        Args:
+            rows: The frames, shape (frames, SIGNAL_COUNT); the array itself is kept.
+        """
+        if self._fill:
+            self.chunks.append(self._current[: self._fill])
+            self._current, self._fill = np.empty((_CHUNK, SIGNAL_COUNT)), 0
+        if len(rows):
+            self.chunks.append(rows)
+
+    def rows(self) -> FloatArray:
+        """All rows, shape (frames, SIGNAL_COUNT), read-only."""
+        self.extend(np.empty((0, SIGNAL_COUNT)))
+        whole = np.concatenate(self.chunks) if self.chunks else np.empty((0, SIGNAL_COUNT))
+        whole.flags.writeable = False
+        return whole
+
+
+class FlightSinks:
+    """Hands rows on; implements ``rtsim.realtime.FrameSink``."""
+
+    def __init__(
+        self,
+        *,
+        log: RowLog | None = None,
+        view: RowView | None = None,
+        mirror: RowMirror | None = None,
+        watch_corridor: bool = True,
+        limits: Callable[[Callable[[LogEvent], None]], LimitWatch] | None = None,
+        on_rows: Callable[[FloatArray], None] | None = None,
+        on_event: Callable[[LogEvent], None] | None = None,
+    ) -> None:
+        """Connect.
+
+        Args:
+            log: Keeps every row and event.
+            view: Shows what it can.
+            mirror: Shown every row of a paced flight beside the view (MAVLink).
+            watch_corridor: Make events of changes of the corridor level.
+            limits: Makes what watches limits and protection from whom it tells; None: nobody watches.
+            on_rows: Told the last row flown (progress and status lines); must be quick.
+            on_event: Told every event; must be quick.
+        """
+        self.history = History()
+        self.events: list[LogEvent] = []
+        self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
+        self._mirror = mirror
+        self._watch_corridor = watch_corridor
+        self._limits = limits(self.event) if limits is not None else None
+        self._level = 0.0
+        self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
+
+    def view(self, row: FloatArray, timing: FloatArray) -> None:
+        """Show a row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Timing columns of the frame before.
+        """
+        if self._view is not None:
+            timing[_DROPPED] = self._view.dropped
+            self._view.push(row, timing)
+        if self._mirror is not None:
+            self._mirror.push(row, timing)
+
+    def record(self, row: FloatArray, timing: FloatArray) -> None:
+        """Keep a row.
+
+        Args:
+            row: The frame, shape (SIGNAL_COUNT,).
+            timing: Its timing columns.
+        """
+        self.history.append(row)
+        if self._log is not None:
+            self._log.push(row, timing)
+            if self._log.failure is not None:
+                self._drop_log(row, self._log.failure)
+        if self._watch_corridor and row[COLUMN.corridor_level] != self._level:
+            self._tell_level(row)
+        if self._limits is not None:
+            self._limits.row(row)
+        if self._on_rows is not None:
+            self._on_rows(row)
+
+    def block(self, rows: FloatArray) -> None:
+        """Show and keep many rows.
+
+        Args:
+            rows: The frames, shape (frames, SIGNAL_COUNT).
+        """
+        if not len(rows):
+            return
+        self.history.extend(rows)
+        if self._log is not None:
+            self._log.push_block(rows)
+            if self._log.failure is not None:
+                self._drop_log(rows[-1], self._log.failure)
+        if self._view is not None:
+            self._show_block(self._view, rows)
+        if self._watch_corridor:
+            levels = rows[:, COLUMN.corridor_level]
+            before = np.concatenate(([self._level], levels[:-1]))
+            for number in np.flatnonzero(levels != before):
+                self._tell_level(rows[number])
+        if self._limits is not None:
+            self._limits.flush()
+            self._limits.rows(rows)
+        if self._on_rows is not None:
+            self._on_rows(rows[-1])
+
+    def watched(self) -> dict[str, Any]:
+        """What was seen of limits and protection, for the summary; empty where nobody watched."""
+        return self._limits.summary() if self._limits is not None else {}
+
+    def event(self, event: LogEvent) -> None:
+        """Keep and show an event.
+
+        Args:
+            event: What happened.
+        """
+        self.events.append(event)
+        if self._log is not None:
+            self._log.event(event)
+        if self._view is not None:
+            self._view.event(event.text, event.level)
+        if self._on_event is not None:
+            self._on_event(event)
+
+    def _drop_log(self, row: FloatArray, failure: OutputError) -> None:
+        """Go on without a log that broke, and say so at once."""
+        self._log = None
+        frame, time_s = int(row[COLUMN.frame]), float(row[COLUMN.time_s])
+        self.event(LogEvent(frame, time_s, "log_failed", str(failure), "warning"))
+
+    def _show_block(self, view: RowView, rows: FloatArray) -> None:
+        """Push rows no faster than the view takes them, so that a recording at full speed has no holes."""
+        for number, row in enumerate(rows):
+            if number % _VIEW_PIECE == 0:
+                while view.backlog > _VIEW_BACKLOG and view.alive:
+                    time.sleep(0.001)
+                    view.watch()
+            view.push(row, self._no_timing)
+
+    def _tell_level(self, row: FloatArray) -> None:
+        level = int(row[COLUMN.corridor_level])
+        self._level = float(level)
+        margin, side = (
+            row[COLUMN.margin_kt],
+            "low" if row[COLUMN.margin_low_kt] < row[COLUMN.margin_high_kt] else "high",
+        )
+        name = LEVEL_NAMES[level]
+        text = (
+            "corridor clear again"
+            if level == 0
+            else f"corridor {name}: {margin:.1f} kn from the {side}-speed side at {row[COLUMN.airspeed_kt]:.0f} kn, "
+            f"nacelle {row[COLUMN.nacelle_deg]:.0f} deg"
+        )
+        self.event(
+            LogEvent(
+                int(row[COLUMN.frame]),
+                float(row[COLUMN.time_s]),
+                "corridor",
+                text,
+                "info" if level == 0 else name,
+                {"margin_kt": float(margin), "side": side, "level": level},
+            )
+        )

@@ -1,0 +1,1 @@
+"""Verdicts on envelope protection: trials, reports, bundles."""

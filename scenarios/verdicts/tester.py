@@ -1,0 +1,373 @@
+"""Flies scenarios as tests and judges them: with a law and without, the same seed, by bounds and by each other."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.measures.metrics import flight_metrics
+from rtsim.measures.trial_metrics import TrialMetrics
+from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
+from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
+from scenarios.files.scenario import CorridorName, Expectation, PlantName, Scenario
+from scenarios.files.trial import Trial
+from scenarios.verdicts.events import new_violations
+
+TEST_CORRIDOR: CorridorName = "flight"
+"""Corridor of scenarios that name none."""
+LAW_CLAUSE = "law"
+"""Metric of the clause that the law runs without failing."""
+HAND_PILOT = "mavlink"
+"""Scenarios with this pilot need a person and are no tests."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One clause and what the flight made of it."""
+
+    name: str
+    """What was expected, in words."""
+    metric: str
+    """What was measured; ``off.`` or ``difference.`` before it where it is not the protected flight's."""
+    held: bool
+    """Whether it held."""
+    value: float | str | None
+    """What was measured."""
+    limit: str
+    """What was allowed."""
+
+    @property
+    def sentence(self) -> str:
+        """What to say where it failed: ``metric=value want limit``."""
+        value = f"{self.value:.4g}" if isinstance(self.value, float) else str(self.value)
+        return f"{self.metric}={value} want {self.limit}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlightHistory:
+    """The history of one flight of a case."""
+
+    rows: FloatArray = field(repr=False)
+    """Frame rows."""
+    end_reason: str
+    """Why it ended by itself, or empty."""
+
+    @property
+    def history_sha256(self) -> str:
+        """Hash of the history."""
+        return history_sha256([self.rows])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Case:
+    """One scenario, flown and judged."""
+
+    scenario: Scenario
+    """What was flown."""
+    law: str
+    """Law under test."""
+    kind: str
+    """Kind of the trial, or ``flight`` for a scenario that is judged by its flight alone."""
+    findings: tuple[Finding, ...]
+    """Every clause."""
+    metrics: dict[str, float]
+    """Metrics of the protected flight."""
+    off_metrics: dict[str, float]
+    """Metrics of its unprotected twin; empty where there is none."""
+    flight: FlightHistory
+    """The protected flight."""
+    off: FlightHistory | None
+    """Its unprotected twin."""
+    wall_s: float
+    """Time it took [s]."""
+    error: str = ""
+    """What kept it from being flown or judged; empty where nothing did."""
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.scenario.name
+
+    @property
+    def verdict(self) -> Literal["passed", "failed", "error"]:
+        """How it went."""
+        if self.error:
+            return "error"
+        return "passed" if all(finding.held for finding in self.findings) else "failed"
+
+    @property
+    def failures(self) -> tuple[Finding, ...]:
+        """Clauses that did not hold."""
+        return tuple(finding for finding in self.findings if not finding.held)
+
+    @property
+    def law_failure(self) -> str:
+        """What the law under test did wrong by itself (raised, hung, gave NaN ...); empty where it ran."""
+        return next((str(item.value) for item in self.failures if item.metric == LAW_CLAUSE), "")
+
+    def summary(self) -> dict[str, object]:
+        """The case as JSON values."""
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "law": self.law,
+            "verdict": self.verdict,
+            "error": self.error,
+            "seed": self.scenario.seed,
+            "plant": self.scenario.plant,
+            "corridor_name": self.scenario.corridor_name,
+            "failures": [finding.sentence for finding in self.failures],
+            "expectations": [
+                {
+                    "name": item.name,
+                    "metric": item.metric,
+                    "held": item.held,
+                    "value": item.value,
+                    "limit": item.limit,
+                }
+                for item in self.findings
+            ],
+            "metrics": self.metrics,
+            "off_metrics": self.off_metrics,
+            "end_reason": self.flight.end_reason,
+            "history_sha256": self.flight.history_sha256,
+            "off_history_sha256": None if self.off is None else self.off.history_sha256,
+            "wall_s": self.wall_s,
+        }
+
+
+class Tester:
+    """Flies cases; keeps what is costly to load."""
+
+    def __init__(self, *, law: str | None = None, plant: PlantName | None = None) -> None:
+        """Remember what to test.
+
+        Args:
+            law: Law under test in every scenario; None: each scenario's own.
+            plant: Aircraft model in every scenario; None: each scenario's own.
+
+        Raises:
+            InputError: There is no such law.
+        """
+        self._law, self._plant = law, plant
+        self._folder = present_folder()
+        self._benches: dict[tuple[str, str, int], Bench] = {}
+        if law is not None:
+            law_chain(law, self._folder)
+
+    def run(self, scenario: Scenario) -> Case:
+        """Fly and judge one scenario.
+
+        Args:
+            scenario: The scenario; with a ``[trial]`` it is flown with a law and without.
+
+        Raises:
+            InputError: It cannot be flown.
+        """
+        # Tests judge by the flight corridor, with laws and without, unless the scenario names another.
+        scenario = dataclasses.replace(
+            scenario, plant=self._plant or scenario.plant, corridor=scenario.corridor or TEST_CORRIDOR
+        )
+        if scenario.trial is None:
+            return self._flight_case(scenario)
+        return self._trial_case(scenario, scenario.trial)
+
+    def _trial_case(self, scenario: Scenario, trial: Trial) -> Case:
+        begin = time.perf_counter()
+        law = self._law or trial.law
+        law_chain(law, self._folder)
+        key = (scenario.plant, scenario.corridor_name, scenario.rate_hz)
+        if key not in self._benches:
+            self._benches[key] = Bench(plant=scenario.plant, corridor=scenario.corridor_name, rate_hz=scenario.rate_hz)
+        bench = self._benches[key]
+        plan = plan_of(scenario)
+        off = bench.fly(plan, "off", keep=True)
+        flown = fly_law(bench, plan, LawVariant(law), folder=self._folder, repeat=True, keep=True)
+        findings = [
+            *_law_findings(flown),
+            *_default_findings(trial, flown.metrics, off.metrics),
+            *_clause_findings(trial, flown.metrics, off.metrics),
+            *_flight_findings(scenario, flown.rows),
+        ]
+        return Case(
+            scenario=scenario,
+            law=law,
+            kind=trial.kind,
+            findings=tuple(findings),
+            metrics=dict(flown.metrics),
+            off_metrics=dict(off.metrics),
+            flight=FlightHistory(flown.rows, flown.end_reason),
+            off=FlightHistory(off.rows, off.end_reason),
+            wall_s=time.perf_counter() - begin,
+        )
+
+    def _flight_case(self, scenario: Scenario) -> Case:
+        """A scenario without a trial: one flight, judged by its own expectations."""
+        from scenarios.files.options import Overrides
+        from scenarios.flight.runner import fly
+
+        begin = time.perf_counter()
+        overrides = Overrides(plant=scenario.plant, protection=self._law)
+        record = fly(scenario, speed="max", overrides=overrides)
+        asked = {clause.name: clause for clause in scenario.expectations}
+        findings = []
+        for item in record.verdicts:
+            clause = asked.get(item.name)
+            metric = "completed" if clause is None else clause.metric
+            words = _words(item.limit) if clause is None else _limit_words(clause)
+            value = None if item.value is None else float(item.value)
+            findings.append(Finding(item.name, metric, item.held, value, words))
+        return Case(
+            scenario=record.scenario,
+            law=record.scenario.protection,
+            kind="flight",
+            findings=tuple(findings),
+            metrics={},
+            off_metrics={},
+            flight=FlightHistory(record.rows, "" if record.completed else record.end_reason),
+            off=None,
+            wall_s=time.perf_counter() - begin,
+        )
+
+
+def plan_of(scenario: Scenario) -> FlightPlan:
+    """The flight of a scenario, without a law.
+
+    Args:
+        scenario: The scenario.
+    """
+    return FlightPlan(
+        programme=scenario.programme,
+        start=scenario.start,
+        duration=scenario.duration,
+        pulses=scenario.pulses,
+        air=scenario.air,
+        faults=scenario.faults,
+        wind=scenario.wind,
+        pilot_noise=scenario.pilot_noise,
+        outer_loop=scenario.outer_loop,
+        automatic_flaps=scenario.automatic_flaps,
+        governor=scenario.governor,
+        seed=scenario.seed,
+    )
+
+
+def is_test(scenario: Scenario) -> bool:
+    """Whether a scenario can be flown and judged without a person.
+
+    Args:
+        scenario: The scenario.
+    """
+    judged = scenario.trial is not None or bool(scenario.expectations)
+    return judged and scenario.pilot != HAND_PILOT
+
+
+def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
+    """A scenario that could not be flown.
+
+    Args:
+        scenario: The scenario.
+        law: Law that was asked for; None: the scenario's own.
+        problem: What kept it from being flown.
+    """
+    trial = scenario.trial
+    return Case(
+        scenario=dataclasses.replace(scenario, corridor=scenario.corridor or TEST_CORRIDOR),
+        law=law or (trial.law if trial is not None else scenario.protection),
+        kind=trial.kind if trial is not None else "flight",
+        findings=(),
+        metrics={},
+        off_metrics={},
+        flight=FlightHistory(np.zeros((0, SIGNAL_COUNT)), ""),
+        off=None,
+        wall_s=0.0,
+        error=problem,
+    )
+
+
+def _law_findings(flown: TrialFlight) -> list[Finding]:
+    """A law that failed has failed the test, whatever the flight looks like."""
+    found: Sequence[str] = flown.law_problems
+    return [
+        Finding(
+            "the law runs without failing", LAW_CLAUSE, not found, "; ".join(found) if found else "ran", "no failure"
+        )
+    ]
+
+
+def _default_findings(trial: Trial, law: TrialMetrics, off: TrialMetrics) -> list[Finding]:
+    """What is expected of every trial: no harm, and that there was something to protect from."""
+    found = [
+        Finding(
+            f"not vacuous: the unprotected flight violates {name}",
+            f"off.{name}",
+            name in off.exceeded,
+            "violated" if name in off.exceeded else "kept",
+            "violated",
+        )
+        for name in trial.off_leaves
+    ]
+    if trial.off_depth_kt > 0.0:
+        depth = off["depth_kt"]
+        name = "not vacuous: the unprotected flight leaves the corridor far enough"
+        found.append(Finding(name, "off.depth_kt", depth >= trial.off_depth_kt, depth, f">= {trial.off_depth_kt:g}"))
+    most = off["height_lost_m"] + trial.no_harm_height
+    lost = law["height_lost_m"]
+    words = f"<= {most:.4g} (off + {trial.no_harm_height:g})"
+    found.append(Finding("no harm: height", "height_lost_m", lost <= most, lost, words))
+    new = sorted(new_violations(law, off))
+    found.append(
+        Finding(
+            "no harm: no limit exceeded that was kept without the law",
+            "new_violations",
+            not new,
+            ", ".join(new) if new else "none",
+            "none",
+        )
+    )
+    return found
+
+
+def _clause_findings(trial: Trial, law: TrialMetrics, off: TrialMetrics) -> list[Finding]:
+    found = []
+    for clause in trial.clauses:
+        value = (
+            {"law": law, "off": off}[clause.of][clause.metric]
+            if clause.of != "difference"
+            else (law[clause.metric] - off[clause.metric])
+        )
+        metric = clause.metric if clause.of == "law" else f"{clause.of}.{clause.metric}"
+        found.append(Finding(clause.name, metric, clause.holds(value), value, clause.limit))
+    return found
+
+
+def _flight_findings(scenario: Scenario, rows: FloatArray) -> list[Finding]:
+    """The scenario's ``[[expect]]`` clauses, of the protected flight."""
+    if not scenario.expectations:
+        return []
+    metrics = flight_metrics(rows, scenario.programme, 1.0 / scenario.rate_hz)
+    found = []
+    for clause in scenario.expectations:
+        value = metrics.value(clause.metric)
+        found.append(Finding(clause.name, clause.metric, clause.holds(value), value, _limit_words(clause)))
+    return found
+
+
+def _limit_words(clause: Expectation) -> str:
+    """What a clause of ``[[expect]]`` allows, such as ``<= 1``."""
+    words = _words(clause.limit)
+    if clause.minimum is None:
+        return f"<= {words}"
+    return f">= {words}" if clause.maximum is None else words
+
+
+def _words(limit: float | bool | list[float]) -> str:
+    if isinstance(limit, list):
+        return " to ".join(f"{item:g}" for item in limit)
+    return str(limit) if isinstance(limit, bool) else f"{limit:g}"

@@ -1,0 +1,1 @@
+"""How a flight hands data to other processes without ever waiting for them."""

@@ -1,0 +1,1 @@
+"""The flight log: written without loss, read at any moment, exported, drawn."""

@@ -1,0 +1,336 @@
+"""Pictures of a recorded flight: path through the corridor, time histories with units, controls, margins, timing."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rtsim.errors import InputError, OutputError
+from rtsim.frame import FloatArray
+from telemetry.log.export import write_and_rename
+from telemetry.log.reader import FlightLog
+from telemetry.view.signal_groups import label, plot_groups
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from telemetry.view.corridor_outline import CorridorOutline
+
+_Picture = tuple[str, "Callable[[FlightLog, Figure], None]", tuple[float, float]]
+
+FORMATS = ("svg", "png")
+"""Every picture is written in each of these."""
+
+_POINTS = 2500
+_NEAR_KT, _NEAR_DEG = 14.0, 3.0
+_COLOURS = ("#1f6fb4", "#e07b00", "#2a9d54", "#b0309a", "#6a51c4", "#0f9b9b", "#a05a2c", "#444444", "#c23b3b")
+_LOW, _HIGH, _INSIDE = "#d98a00", "#d03c3c", "#2a9d54"
+_ACTING = "#b030c0"
+_LEVELS = ((-np.inf, 0.0, "#d03c3c"), (0.0, 4.0, "#f08030"), (4.0, 10.0, "#f5c842"))
+
+
+@dataclass(frozen=True, slots=True)
+class _Panel:
+    """One pair of axes: signals of one unit; references are dashed."""
+
+    title: str
+    signals: tuple[str, ...]
+    dashed: tuple[str, ...] = ()
+    reason: str = ""
+    """Signal that says why protection changes this; the panel is shaded while it does."""
+
+
+_FLIGHT = (
+    _Panel("Airspeed", ("airspeed_kt",), ("airspeed_reference_kt",)),
+    _Panel("Nacelle angle, 90 helicopter", ("nacelle_deg",), ("nacelle_reference_deg",), "protection_nacelle_reason"),
+    _Panel("Altitude", ("altitude_m",), ("altitude_reference_m",)),
+    _Panel("Attitude", ("pitch_deg", "angle_of_attack_deg", "flight_path_deg")),
+)
+_CONTROLS = (
+    _Panel("Stick, 1 is full forward", ("stick",), ("pilot_stick",), "protection_stick_reason"),
+    _Panel("Power lever, 1 is full power", ("lever",), ("pilot_lever",), "protection_lever_reason"),
+    _Panel("Collective at 75 % radius", ("collective_75_deg",)),
+    _Panel("Cyclic and elevator", ("cyclic_deg", "elevator_deg")),
+)
+_ROTOR = (
+    _Panel("Flapping", ("flapping_deg", "longitudinal_flapping_deg", "lateral_flapping_deg")),
+    _Panel("Torque of one mast", ("mast_torque_inlb",)),
+    _Panel("Power", ("power_shp", "engine_power_shp")),
+    _Panel("Load factor", ("load_factor",)),
+)
+
+
+def plot_flight(log: FlightLog, directory: str | os.PathLike[str]) -> list[Path]:
+    """Draw a flight.
+
+    Args:
+        log: The flight; what it does not hold (boundaries, timing) is left out.
+        directory: Where the pictures go; it is made if needed, pictures of the same name are replaced.
+
+    Returns:
+        The files written, SVG and PNG of each picture.
+
+    Raises:
+        InputError: The log holds no frames.
+        OutputError: The pictures cannot be written.
+    """
+    if len(log.rows) < 2:
+        raise InputError("the log holds no flight to draw", file=str(log.path), mend="record a longer flight")
+    out = Path(directory)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
+        raise OutputError(f"{out}: cannot be made ({failure.strerror}); choose another directory.") from failure
+    files: list[Path] = []
+    for name, draw, size in _pictures(log):
+        files += _write(log, out / name, draw=draw, size=size)
+    return files
+
+
+def _pictures(log: FlightLog) -> list[_Picture]:
+    """Name, drawing function and size [in] of every picture that this flight gives."""
+    pictures: list[_Picture] = [
+        ("corridor", _draw_corridor, (7.5, 6.5)),
+        ("flight", lambda flight, figure: _draw_panels(flight, figure, _FLIGHT), (9.0, 9.0)),
+        ("controls", lambda flight, figure: _draw_panels(flight, figure, _CONTROLS), (9.0, 9.0)),
+        ("flapping", lambda flight, figure: _draw_panels(flight, figure, _ROTOR), (9.0, 9.0)),
+        ("margins", _draw_margins, (9.0, 6.0)),
+        ("signals", _draw_all_signals, (15.0, 18.0)),
+    ]
+    if np.isfinite(log["lateness_us"]).any():
+        pictures.append(("timing", _draw_timing, (9.0, 7.0)))
+    return pictures
+
+
+def _write(
+    log: FlightLog, target: Path, *, draw: Callable[[FlightLog, Figure], None], size: tuple[float, float]
+) -> Iterable[Path]:
+    """Draw one picture into its files, with a figure of its own: no global state, no window."""
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    style: dict[Any, Any] = {
+        "axes.grid": True,
+        "grid.alpha": 0.35,
+        "font.size": 9.0,
+        "axes.titlesize": 10.0,
+        "svg.hashsalt": "rtsim",
+    }
+    with mpl.rc_context(style):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasAgg(figure)
+        draw(log, figure)
+        figure.suptitle(f"{log.metadata.scenario_name} ({log.path.name})", fontsize=11)
+        for ending in FORMATS:
+            path = target.with_suffix(f".{ending}")
+            # Without its date the same flight gives the same file.
+            options: dict[str, Any] = {"metadata": {"Date": None}} if ending == "svg" else {"dpi": 130}
+            write_and_rename(path, partial(figure.savefig, **options))
+            yield path
+
+
+def _thin(values: FloatArray) -> FloatArray:
+    """Every so manieth value, so that a picture of a long flight stays small."""
+    return values[:: max(1, len(values) // _POINTS)]
+
+
+def _curve(axes: Axes, log: FlightLog, name: str, *, colour: str, dashed: bool = False) -> None:
+    axes.plot(
+        _thin(log["time_s"]),
+        _thin(log[name]),
+        color=colour,
+        linewidth=1.0 if dashed else 1.4,
+        linestyle="--" if dashed else "-",
+        label=label(name, unit=False),
+    )
+
+
+def _legend(axes: Axes, *, size: float = 8.0) -> None:
+    """Names above the axes on the right, where they cover no curve."""
+    count = len(axes.get_legend_handles_labels()[0])
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=count,
+        frameon=False,
+        fontsize=size,
+        borderpad=0.0,
+        borderaxespad=0.2,
+        columnspacing=1.0,
+        handlelength=1.4,
+    )
+
+
+def _draw_panels(log: FlightLog, figure: Figure, panels: tuple[_Panel, ...]) -> None:
+    rows = figure.subplots(len(panels), 1, sharex=True)
+    for axes, panel in zip(rows, panels, strict=True):
+        for colour, name in zip(_COLOURS, panel.signals, strict=False):
+            _curve(axes, log, name, colour=colour)
+        for name in panel.dashed:
+            _curve(axes, log, name, colour="#444444", dashed=True)
+        if panel.reason:
+            _shade_protection(axes, log, panel.reason)
+        unit = log.unit(panel.signals[0])
+        axes.set_title(panel.title, loc="left")
+        axes.set_ylabel(f"[{unit}]" if unit else "share of travel" if panel.signals[0] in {"stick", "lever"} else "[-]")
+        _legend(axes)
+    rows[-1].set_xlabel("time [s]")
+
+
+def _shade_protection(axes: Axes, log: FlightLog, reason: str) -> None:
+    """Shade the time in which a protection law changes what the hands ask for."""
+    acting = np.concatenate(([False], log[reason] != 0.0, [False]))
+    time = log["time_s"]
+    edges = np.flatnonzero(np.diff(acting))
+    for number, (first, last) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        axes.axvspan(
+            time[first], time[min(last, len(time) - 1)], color=_ACTING, alpha=0.15, linewidth=0,
+            label="protection acts" if not number else None,
+        )  # fmt: skip
+
+
+def _draw_corridor(log: FlightLog, figure: Figure) -> None:
+    axes = figure.subplots()
+    outline = log.metadata.corridor
+    if outline is not None:
+        axes.plot(outline.low_kt, outline.low_nacelle_deg, color=_LOW, linewidth=2.0, label="low-speed boundary")
+        axes.plot(outline.high_kt, outline.high_nacelle_deg, color=_HIGH, linewidth=2.0, label="high-speed boundary")
+        if outline.centre_kt:
+            axes.plot(outline.centre_kt, outline.centre_nacelle_deg, "--", color="#777777", label="centre line")
+        _fill_inside(axes, outline)
+        axes.set_title(f"Conversion corridor '{outline.name}'")
+        _tell_downstop(axes, log, outline)
+    axes.plot(
+        _thin(log["airspeed_reference_kt"]), _thin(log["nacelle_reference_deg"]), color="#444444", linewidth=0.9,
+        linestyle=":", label="reference",
+    )  # fmt: skip
+    axes.plot(_thin(log["airspeed_kt"]), _thin(log["nacelle_deg"]), color=_COLOURS[0], linewidth=1.8, label="flown")
+    _mark_times(axes, log)
+    axes.set_xlabel("airspeed [kn]")
+    axes.set_ylabel("nacelle angle [deg], 90 helicopter")
+    axes.set_ylim(-5.0, 100.0)
+    axes.legend(loc="lower left", fontsize=8)
+
+
+def _fill_inside(axes: Axes, outline: CorridorOutline) -> None:
+    """Tint what the corridor allows."""
+    angles = np.linspace(0.0, min(max(outline.low_nacelle_deg), max(outline.high_nacelle_deg)), 200)
+    sides = []
+    for nacelles, speeds in ((outline.low_nacelle_deg, outline.low_kt), (outline.high_nacelle_deg, outline.high_kt)):
+        order = np.argsort(nacelles)
+        sides.append(np.interp(angles, np.array(nacelles)[order], np.array(speeds)[order]))
+    axes.fill_betweenx(angles, *sides, color=_INSIDE, alpha=0.08, linewidth=0)
+
+
+def _tell_downstop(axes: Axes, log: FlightLog, outline: CorridorOutline) -> None:
+    """On the downstop the high side lies elsewhere: say where, if the flight was there."""
+    there = np.flatnonzero(log["on_downstop"])
+    if len(there):
+        fastest = float(log["airspeed_kt"][there[-1]] + log["margin_high_kt"][there[-1]])
+        corner = outline.high_kt[int(np.argmin(outline.high_nacelle_deg))]
+        axes.annotate(
+            f"on the downstop to {fastest:.0f} kn", (corner, 0.0), xytext=(0, -8), textcoords="offset points",
+            ha="right", va="top", fontsize=7, color=_HIGH,
+        )  # fmt: skip
+
+
+def _mark_times(axes: Axes, log: FlightLog) -> None:
+    """Marks along the path; those that would cover one another become one with the span of their times."""
+    time, speed, nacelle = log["time_s"], log["airspeed_kt"], log["nacelle_deg"]
+    places: list[tuple[int, list[float]]] = []
+    for mark in np.arange(time[0], time[-1] + 1e-9, _mark_step(float(time[-1] - time[0]))):
+        index = min(int(np.searchsorted(time, mark)), len(time) - 1)
+        near = [
+            marks
+            for place, marks in places
+            if abs(speed[place] - speed[index]) < _NEAR_KT and abs(nacelle[place] - nacelle[index]) < _NEAR_DEG
+        ]
+        if near:
+            near[0].append(float(mark))
+        else:
+            places.append((index, [float(mark)]))
+    for index, marks in places:
+        axes.plot(speed[index], nacelle[index], "o", color=_COLOURS[0], markersize=3.5)
+        words = f"{marks[0]:.0f} s" if len(marks) == 1 else f"{marks[0]:.0f} to {marks[-1]:.0f} s"
+        axes.annotate(words, (speed[index], nacelle[index]), textcoords="offset points", xytext=(5, 5), fontsize=7)
+
+
+def _draw_margins(log: FlightLog, figure: Figure) -> None:
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    _curve(upper, log, "margin_low_kt", colour=_LOW)
+    _curve(upper, log, "margin_high_kt", colour=_HIGH)
+    _curve(upper, log, "margin_kt", colour="#222222", dashed=True)
+    floor = min(0.0, float(log["margin_kt"].min())) - 3.0
+    for low, high, colour in _LEVELS:
+        upper.axhspan(max(low, floor), high, color=colour, alpha=0.18, linewidth=0)
+    upper.set_ylim(bottom=floor)
+    upper.set_ylabel("margin [kn]")
+    upper.set_title("Margins; shaded: caution, warning, outside", loc="left")
+    _legend(upper)
+    lower.step(_thin(log["time_s"]), _thin(log["corridor_level"]), where="post", color="#222222")
+    lower.set_yticks([0, 1, 2, 3], ["clear", "caution", "warning", "exceedance"])
+    lower.set_ylim(-0.3, 3.3)
+    lower.set_xlabel("time [s]")
+
+
+def _draw_all_signals(log: FlightLog, figure: Figure) -> None:
+    """One plot for every group and unit, so that nothing recorded goes unseen."""
+    groups = [group for group in plot_groups() if not group.path.startswith("plots/loop")]
+    grid = figure.subplots(-(-len(groups) // 3), 3, sharex=True).ravel()
+    for axes, group in zip(grid, groups, strict=False):
+        for index, column in enumerate(group.columns):
+            _curve(axes, log, log.names[column], colour=_COLOURS[index % len(_COLOURS)])
+        long = sum(len(label(log.names[column], unit=False)) for column in group.columns) > 44
+        axes.set_title(group.title if not long else group.title.partition(" [")[0], loc="left", fontsize=8.5)
+        if long:
+            axes.set_ylabel(f"[{group.title.partition(' [')[2]}", fontsize=8)
+        low, high = axes.get_ylim()
+        if high - low < 0.2 and len({float(log[log.names[column]].max()) for column in group.columns}) == 1:
+            axes.set_ylim(0.5 * (low + high) - 1.0, 0.5 * (low + high) + 1.0)  # nothing moves: no zoom into nothing
+        if len(group.columns) > 1:
+            _legend(axes, size=5.5 if long else 6.5)
+    for axes in grid[len(groups) :]:
+        axes.set_visible(False)
+    for axes in grid[: len(groups)][-3:]:
+        axes.set_xlabel("time [s]")
+        axes.xaxis.set_tick_params(labelbottom=True)
+
+
+def _draw_timing(log: FlightLog, figure: Figure) -> None:
+    upper, lower = figure.subplots(2, 1)
+    time = log["time_s"]
+    for colour, name in zip(_COLOURS, ("lateness_us", "work_us", "work_cpu_us"), strict=False):
+        values = log[name]
+        upper.plot(time, values, ".", markersize=1.5, color=colour, label=label(name, unit=False), rasterized=True)
+        good = values[np.isfinite(values) & (values > 0.0)]
+        if len(good):
+            lower.hist(
+                good,
+                bins=np.geomspace(max(0.5, good.min()), good.max() + 1.0, 80),
+                histtype="step",
+                color=colour,
+                label=f"{label(name, unit=False)}: p50 {np.median(good):.0f} us, p99 {np.percentile(good, 99):.0f} us",
+            )
+    upper.set_yscale("symlog", linthresh=10.0)
+    upper.set_ylabel("[us]")
+    upper.set_xlabel("time [s]")
+    upper.set_title(f"Loop timing; overruns: {np.nanmax(log['overruns']):.0f}", loc="left")
+    upper.legend(loc="upper right", fontsize=8, markerscale=6)
+    lower.set_xscale("log")
+    lower.set_yscale("log")
+    lower.set_xlabel("time [us]")
+    lower.set_ylabel("frames")
+    lower.legend(loc="upper right", fontsize=8)
+
+
+def _mark_step(duration_s: float) -> float:
+    """Seconds between the marks on the path: about eight of them."""
+    return next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0) if duration_s / step <= 8.0), 300.0)

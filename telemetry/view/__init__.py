@@ -1,0 +1,1 @@
+"""The Rerun view of a flight."""

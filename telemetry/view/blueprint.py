@@ -1,0 +1,155 @@
+"""How the views are laid out when the viewer opens: for the pilot, for the engineer, for replay."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from telemetry.view import corridor as rerun_corridor
+from telemetry.view import instruments as rerun_instruments
+from telemetry.view.colours import BACKGROUND
+from telemetry.view.options import Layout
+from telemetry.view.plots import PILOT_PLOTS
+from telemetry.view.signal_groups import plot_groups
+
+SHOWN_SECONDS = 30.0
+"""Length of the time histories that follow the flight [s]."""
+
+
+ENGINEER_TABS: dict[str, tuple[str, ...]] = {
+    "Controls, rotors and loads": (),
+    "Motion": ("speed", "nacelle", "altitude", "attitude", "position"),
+    "Corridor, protection and air": ("corridor", "protection", "air", "failures"),
+    "Loop health": ("loop",),
+}
+"""Tabs of the engineer's layout and the groups of signals in each; the first takes those that are nowhere else."""
+
+
+def blueprint(layout: Layout) -> Any:
+    """The layout of that name.
+
+    Args:
+        layout: ``pilot``, ``engineer`` or ``replay``.
+    """
+    replay = layout == "replay"
+    content = _engineer(follow=True) if layout == "engineer" else _pilot(follow=not replay)
+    if replay:
+        time_panel = rrb.TimePanel(state="expanded", timeline="sim_time", play_state="Paused")
+    else:
+        time_panel = rrb.TimePanel(state="collapsed", timeline="sim_time", play_state="Following")
+    return rrb.Blueprint(
+        content,
+        time_panel,
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.TopPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _pilot(*, follow: bool) -> Any:
+    """Aircraft, instruments and corridor large; four plots and the events below."""
+    plots = [_time_series(path, title, follow=follow) for path, (title, _) in PILOT_PLOTS.items()]
+    top = rrb.Horizontal(_flight(), _instruments(), _corridor(), column_shares=[4.6, 4.35, 4.35])
+    bottom = rrb.Horizontal(
+        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), column_shares=[8.1, 2.2, 3.0]
+    )
+    return rrb.Vertical(top, bottom, row_shares=[2.0, 1.0])
+
+
+def _engineer(*, follow: bool) -> Any:
+    """Plots of every signal in tabs of few enough to be read, beside corridor and aircraft."""
+    groups = plot_groups()
+    elsewhere = {group for tab in ENGINEER_TABS.values() for group in tab}
+
+    def grid(name: str, names: tuple[str, ...]) -> Any:
+        chosen = [
+            group
+            for group in groups
+            if _group_of(group.path) in names or (not names and _group_of(group.path) not in elsewhere)
+        ]
+        views = [
+            _time_series(group.path, group.title, follow=follow, legend=len(group.columns) > 1) for group in chosen
+        ]
+        return rrb.Grid(*views, grid_columns=2 if len(views) < 7 else 3, name=name)
+
+    left = rrb.Vertical(_corridor(), _flight(), _events(), row_shares=[4.0, 3.0, 2.0])
+    tabs = rrb.Tabs(*(grid(name, names) for name, names in ENGINEER_TABS.items()), active_tab=0)
+    return rrb.Horizontal(
+        left, rrb.Vertical(tabs, _modes(follow=follow), row_shares=[2.2, 1.0]), column_shares=[1.0, 2.2]
+    )
+
+
+def _flight() -> Any:
+    return rrb.Spatial3DView(
+        origin="world/chase",
+        contents=["/world/**"],
+        name="Flight",
+        background=rrb.Background(color=(66, 92, 124)),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=(-16.0, -12.5, -9.2), look_target=(0.2, -0.9, -0.5), eye_up=(0, 0, -1)
+        ),
+        line_grid=rrb.LineGrid3D(visible=False),
+        spatial_information=rrb.SpatialInformation(target_frame="tf#/world/chase", show_axes=False),
+    )
+
+
+def _flat(origin: str, name: str, bounds: tuple[tuple[float, float], tuple[float, float]]) -> Any:
+    return rrb.Spatial2DView(
+        origin=origin,
+        name=name,
+        background=rrb.Background(color=BACKGROUND),
+        visual_bounds=rrb.VisualBounds2D(x_range=bounds[0], y_range=bounds[1]),
+    )
+
+
+def _instruments() -> Any:
+    return _flat("instruments", "Instruments", rerun_instruments.BOUNDS)
+
+
+def _corridor() -> Any:
+    return _flat("corridor", "Conversion corridor", rerun_corridor.BOUNDS)
+
+
+def _events() -> Any:
+    return rrb.TextLogView(
+        origin="events/log",
+        name="Events",
+        columns=rrb.TextLogColumns(timeline_columns=["sim_time"], text_log_columns=["LogLevel", "Body"]),
+    )
+
+
+def _modes(*, follow: bool) -> Any:
+    return rrb.StateTimelineView(
+        origin="events",
+        contents=["/events/mode", "/events/corridor", "/events/pilot", "/events/protection"],
+        name="States",
+        time_view=_time_axis(SHOWN_SECONDS) if follow else None,
+    )
+
+
+def _time_series(path: str, title: str, *, follow: bool, legend: bool = True) -> Any:
+    """A plot; while the flight goes on, of its last seconds."""
+    window = None
+    if follow:
+        relative = rrb.TimeRangeBoundary.cursor_relative
+        window = [rrb.VisibleTimeRange("sim_time", start=relative(seconds=-SHOWN_SECONDS), end=relative())]
+    return rrb.TimeSeriesView(
+        origin=path,
+        name=title,
+        axis_x=_time_axis(SHOWN_SECONDS) if follow else None,
+        time_ranges=window,
+        plot_legend=rrb.PlotLegend(corner="LeftTop", visible=legend),
+    )
+
+
+def _time_axis(seconds: float) -> Any:
+    relative = rrb.TimeRangeBoundary.cursor_relative
+    return rrb.TimeAxis(view_range=rr.TimeRange(start=relative(seconds=-seconds), end=relative()))
+
+
+def _group_of(path: str) -> str:
+    return path.split("/")[1]

@@ -1,0 +1,307 @@
+"""The flight's end of the Rerun view: rows into a ring, orders into a pipe, and a watch on the process behind them.
+
+Rerun itself runs in ``telemetry.view.worker``. A view that cannot start, whose viewer is missing, closed or frozen,
+or that crashes, is told in one sentence; the flight neither waits for it nor ends with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from rtsim.errors import OutputError
+from rtsim.frame import FloatArray
+from telemetry.exchange.child_process import child_environment
+from telemetry.exchange.ring import Ring
+from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.view.options import ViewOptions, partial_name
+
+GIVEN_UP = 3
+"""Exit code of a worker that has told why it cannot go on: starting it again would not help."""
+START_TIMEOUT_S = 30.0
+"""A view that is not ready after this long is given up [s]."""
+
+_ROWS_PER_WATCH = 64
+
+
+class RerunView:
+    """Shows one flight."""
+
+    def __init__(
+        self,
+        options: ViewOptions,
+        *,
+        corridor: CorridorOutline | None = None,
+        title: str = "rtsim",
+        rate_hz: float = 250.0,
+        on_message: Callable[[str], None] | None = None,
+    ) -> None:
+        """Start the view; it becomes ready by itself, see ``wait_ready``.
+
+        Args:
+            options: What to show and record.
+            corridor: Boundaries to draw.
+            title: What the recording is called.
+            rate_hz: Frames per second of flight.
+            on_message: Called with one sentence whenever something about the view must be told.
+
+        Raises:
+            OutputError: The recording cannot be written where it was asked for.
+        """
+        self.failure: OutputError | None = None
+        """Why the recording is incomplete, if it is."""
+        self.messages: list[str] = []
+        """Every sentence told so far."""
+        self._options, self._on_message = options, on_message
+        self._configuration = {
+            "corridor": corridor.to_dict() if corridor else None,
+            "title": title,
+            "rate_hz": rate_hz,
+        }
+        if options.record is not None:
+            _check_writable(options.record)
+        self._ring = Ring()
+        self._pushes = 0
+        self._starts = 0
+        self._closed = False
+        self._process: subprocess.Popen[bytes] | None = None
+        self._stderr: Any = None
+        self._ready, self._answers_left = False, b""
+        self._viewer_pid: int | None = None
+        self._beat, self._beat_time = 0, time.monotonic()
+        self._start()
+
+    @property
+    def dropped(self) -> int:
+        """Rows so far that the view was too slow to take."""
+        return self._ring.dropped
+
+    @property
+    def backlog(self) -> int:
+        """Rows pushed that the view has not taken yet; a flight at full speed waits while there are many."""
+        return self._ring.written - self._ring.consumed
+
+    @property
+    def alive(self) -> bool:
+        """Whether something is showing or recording the flight."""
+        return self._process is not None
+
+    @property
+    def ready(self) -> bool:
+        """Whether the view has finished its preparations."""
+        self._read_answers()
+        return self._ready
+
+    def wait_ready(self, timeout_s: float) -> bool:
+        """Give the view time to prepare before the first frame, so that its start does not disturb the loop.
+
+        Args:
+            timeout_s: Longest wait [s].
+
+        Returns:
+            Whether it is ready; the flight can begin in any case.
+        """
+        deadline = time.monotonic() + timeout_s
+        while not self.ready and self.alive and time.monotonic() < deadline:
+            time.sleep(0.01)
+            self.watch()
+        return self._ready
+
+    def push(self, row: FloatArray, timing: FloatArray) -> None:
+        """Show one row; never waits.
+
+        Args:
+            row: The frame's signals, shape (SIGNAL_COUNT,).
+            timing: Its wall-clock columns, shape (TIMING_COUNT,).
+        """
+        self._ring.push(row, timing)
+        self._pushes += 1
+        if self._pushes % _ROWS_PER_WATCH == 0:
+            self.watch()
+
+    def event(self, text: str, level: str = "info") -> None:
+        """Add a line to the event log; never waits.
+
+        Args:
+            text: What happened.
+            level: ``info``, ``caution``, ``warning`` or ``exceedance``.
+        """
+        self._order({"event": text, "level": level})
+
+    def watch(self) -> None:
+        """See whether the view still lives, and end it where it does not; ``push`` does so four times a second."""
+        if self._process is None:
+            return
+        self._read_answers()
+        now = time.monotonic()
+        beat = self._ring.heartbeat
+        if beat != self._beat:
+            self._beat, self._beat_time = beat, now
+        patience = self._options.stall_timeout_s if self._ready else START_TIMEOUT_S
+        code = self._process.poll()
+        if code == GIVEN_UP:
+            self._end_process()
+            self._note_incomplete("the view could not go on")
+        elif code is not None:
+            self._recover(f"The view ended unexpectedly (exit code {code}{self._last_words()})")
+        elif now - self._beat_time > patience:
+            self._recover(f"The view did not move for {patience:.0f} s" if self._ready else "The view did not start")
+
+    def close(self, timeout_s: float = 3.0) -> None:
+        """Finish recording and view; takes at most ``timeout_s``.
+
+        Args:
+            timeout_s: After this the view is ended as it is [s].
+        """
+        if self._closed:
+            return
+        self._closed = True
+        process = self._process
+        if process is not None:
+            self._order({"close": True})
+            with contextlib.suppress(OSError):
+                process.stdin.close()  # type: ignore[union-attr]  # a pipe
+            deadline = time.monotonic() + timeout_s
+            while process.poll() is None and time.monotonic() < deadline:
+                self._read_answers()
+                time.sleep(0.005)
+            self._read_answers()
+            if process.poll() is None:
+                self._end_process()
+                self._tell(f"The view did not close within {timeout_s:.0f} s and was ended.")
+                self._note_incomplete("the view did not close in time")
+            else:
+                self._release_process()
+        self._ring.close()
+
+    def _start(self) -> None:
+        """Start the worker and send it the configuration."""
+        self._starts += 1
+        self._ready, self._answers_left, self._viewer_pid = False, b"", None
+        self._beat, self._beat_time = self._ring.heartbeat, time.monotonic()
+        options = self._options
+        if self._starts > 1 and options.record is not None:
+            options = replace(options, record=options.record.with_stem(f"{options.record.stem}-again{self._starts}"))
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115  # as long as the process
+        process = subprocess.Popen(
+            [sys.executable, "-m", "telemetry.view.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._stderr,
+            env=child_environment(),
+            start_new_session=True,  # Ctrl-C is for the flight
+        )
+        self._process = process
+        assert process.stdin is not None
+        assert process.stdout is not None
+        os.set_blocking(process.stdin.fileno(), False)
+        os.set_blocking(process.stdout.fileno(), False)
+        values = asdict(options) | {"record": str(options.record) if options.record else None}
+        self._order({"options": values, "ring": self._ring.name, **self._configuration})
+
+    def _order(self, order: dict[str, Any]) -> None:
+        """Send one line; a pipe that is full because nobody reads it loses it."""
+        if self._process is None:
+            return
+        with contextlib.suppress(OSError):
+            os.write(self._process.stdin.fileno(), json.dumps(order).encode() + b"\n")  # type: ignore[union-attr]
+
+    def _read_answers(self) -> None:
+        if self._process is None or self._process.stdout is None:
+            return
+        try:
+            data = os.read(self._process.stdout.fileno(), 1 << 16)
+        except OSError:
+            return
+        self._answers_left += data
+        while b"\n" in self._answers_left:
+            line, self._answers_left = self._answers_left.split(b"\n", 1)
+            try:
+                answer = json.loads(line)
+            except ValueError:
+                continue  # something Rerun printed
+            if isinstance(answer, dict):
+                self._take_answer(answer)
+
+    def _take_answer(self, answer: dict[str, Any]) -> None:
+        if answer.get("ready"):
+            self._ready, self._beat_time = True, time.monotonic()
+        if "viewer" in answer:
+            self._viewer_pid = answer["viewer"]
+        if "message" in answer:
+            self._tell(answer["message"])
+        if "failure" in answer and self.failure is None:
+            self.failure = OutputError(answer["failure"])
+            self._tell(answer["failure"])
+
+    def _recover(self, what: str) -> None:
+        """End a view that is stuck or gone; start another as often as the options allow."""
+        self._end_process()
+        self._note_incomplete("the view stopped in flight")
+        if self._starts <= self._options.restarts:
+            self._ring.skip_unread()
+            self._start()
+            self._tell(f"{what}; it was started again. The flight goes on.")
+        else:
+            self._tell(f"{what} and was given up. The flight goes on without it.")
+
+    def _note_incomplete(self, why: str) -> None:
+        if self._options.record is not None and self.failure is None:
+            partial = partial_name(self._options.record)
+            rest = f"what there is stands beside it as {partial.name}" if partial.exists() else "nothing was written"
+            self.failure = OutputError(f"{self._options.record}: the recording is incomplete because {why}; {rest}.")
+
+    def _end_process(self) -> None:
+        """Kill worker and viewer; neither could be asked."""
+        process = self._process
+        assert process is not None
+        process.kill()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(0.1)  # one that waits for a dead disk cannot even be killed
+        if self._viewer_pid is not None:
+            with contextlib.suppress(OSError):
+                os.killpg(self._viewer_pid, signal.SIGKILL)
+        self._release_process()
+
+    def _release_process(self) -> None:
+        process = self._process
+        assert process is not None
+        for stream in (process.stdin, process.stdout, self._stderr):
+            with contextlib.suppress(OSError):
+                stream.close()  # type: ignore[union-attr]  # all three are open
+        self._process = None
+
+    def _last_words(self) -> str:
+        """The last line the worker wrote to its stderr, for a message."""
+        self._stderr.seek(0)
+        lines = [line.strip() for line in self._stderr.read().decode(errors="replace").splitlines() if line.strip()]
+        return f": {lines[-1][:200]}" if lines else ""
+
+    def _tell(self, message: str) -> None:
+        self.messages.append(message)
+        if self._on_message is not None:
+            self._on_message(message)
+
+
+def _check_writable(record: Path) -> None:
+    """Refuse a recording that could not be written, before the flight starts."""
+    try:
+        with tempfile.NamedTemporaryFile(dir=record.parent):
+            pass
+        if record.is_dir():
+            raise IsADirectoryError(None, "it is a directory")
+    except OSError as failure:
+        raise OutputError(
+            f"{record}: the recording cannot be written here ({failure.strerror}); "
+            "choose a directory that exists and is yours."
+        ) from failure
