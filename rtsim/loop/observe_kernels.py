@@ -8,7 +8,6 @@ from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_Q, G_U, G_W
 from rtsim.corridor.corridor_kernels import corridor_margins
-from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.kernels.compiled import inner_kernel
@@ -129,7 +128,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.flap_deg] = flap_now(state.flaps, flap_scheduled) / DEGREE
     row[COLUMN.thrust_per_rotor_lb] = y[OUTPUT.thrust] / POUND_FORCE
     row[COLUMN.power_shp] = power / HORSEPOWER
-    row[COLUMN.engine_power_shp] = engine_power(state.drive, power) / HORSEPOWER / TRANSMISSION_EFFICIENCY
+    row[COLUMN.engine_power_shp] = engine_power(state.drive, power) / HORSEPOWER / tables.drive.efficiency
     row[COLUMN.mast_torque_inlb] = y[OUTPUT.torque] / INCH_POUND
     row[COLUMN.rotor_speed_rpm] = rotor_speed / RPM
     row[COLUMN.margin_kt] = min(scratch.margins[0], scratch.margins[1]) / KNOT

@@ -9,7 +9,9 @@ import numpy as np
 
 from rtsim.aids import AidName, SwitchName, design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
-from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft import INPUTS, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft.controls import control_tables
+from rtsim.aircraft.variables import AUXILIARY_INPUTS
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
@@ -38,7 +40,6 @@ from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables
-from rtsim.lpv.variables import AUXILIARY_INPUTS
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
@@ -122,8 +123,10 @@ class Parts:
     """Work space of the frame."""
     noise_width: int
     """Standard normals the pilot takes per frame; 0 with the noise off."""
+    database: Database = field(repr=False)
+    """The LPV database in use, with the aircraft's profile."""
     database_hash: str
-    """Content hash of the database."""
+    """Hash of the aircraft."""
     needed_aids: tuple[SwitchName, ...]
     """Aids that cannot be switched off: the database does not say what the aircraft does without them."""
     start_x: FloatArray = field(repr=False)
@@ -151,6 +154,12 @@ def build_parts(setup: FlightSetup) -> Parts:
     """
     loaded = load_database(setup.database or None)
     database = flown_database(loaded, setup.database or None)
+    profile = database.profile
+    if setup.plant == "nonlinear" and not profile.is_xv15:
+        raise InputError(
+            f"there is no nonlinear model of the {profile.name}", key="plant", value=setup.plant,
+            allowed="lpv, lpv-plain", mend="fly the LPV aircraft",
+        )  # fmt: skip
     lpv_aircraft = LpvAircraft(database)
     nonlinear_aircraft = Xv15.load()
     airspeed, nacelle, altitude = _start(setup)
@@ -174,16 +183,16 @@ def build_parts(setup: FlightSetup) -> Parts:
         dt=1.0 / setup.rate_hz,
         wind=float(setup.wind),
         lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
-        aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
-        nacelle=load_nacelle_tables(),
-        automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
+        aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, control_tables(profile)),
+        nacelle=load_nacelle_tables(profile),
+        automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
         corridor=load_boundary(setup.corridor, database).tables(),
         pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
-        flaps=load_flap_tables(own),
-        drive=load_drive_tables(own),
+        flaps=load_flap_tables(profile),
+        drive=load_drive_tables(profile, governed_speed=database.rotor_speed),
         aids=design_aids(database),
-        gusts=gust_tables(setup.air),
-        faults=fault_tables(setup.faults),
+        gusts=gust_tables(setup.air, profile),
+        faults=fault_tables(setup.faults, profile),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
         protection=law_tables(
             compiled_law(load_laws(setup.protection)) or "monitor",
@@ -222,7 +231,8 @@ def build_parts(setup: FlightSetup) -> Parts:
         tables=tables,
         scratch=scratch,
         noise_width=noise_width(tables.pilot) if setup.pilot_noise else 0,
-        database_hash=loaded.content_hash,
+        database=database,
+        database_hash=loaded.aircraft_hash,
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
         start_u=u,
@@ -268,7 +278,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     clock = np.zeros(CLOCK_SIZE)
     clock[CLOCK_MODE] = MODE_MOCM if setup.pilot == "mocm" else MODE_EXTERNAL
     u = parts.start_u.copy()
-    u[INPUT.nacelle_rate :] = 0.0
+    u[[place for place, variable in enumerate(INPUTS) if variable.role != "pilot"]] = 0.0
     state = SimulationState(
         x=parts.start_x.copy(),
         u=u,

@@ -33,6 +33,7 @@ from rtsim.loop.data import (
 )
 from rtsim.loop.observe_kernels import observe
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, start_state
+from rtsim.lpv.database import Database
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import L_OVERRIDE
@@ -89,7 +90,9 @@ class Simulation:
         self._observed = False
         self._noise = np.zeros(self._noise_width)
         laws = load_laws(setup.protection, boundary=setup.protection_boundary, database=setup.database)
-        self.laws = LawChain(laws, dt=self.tables.dt) if compiled_law(laws) is None else None
+        self.laws = (
+            LawChain(laws, dt=self.tables.dt, profile=self.database.profile) if compiled_law(laws) is None else None
+        )
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
 
     @property
@@ -125,8 +128,13 @@ class Simulation:
         return next(name for name, value in MODES.items() if value == number)
 
     @property
+    def database(self) -> Database:
+        """The LPV database in use, with the aircraft's profile."""
+        return self._parts.database
+
+    @property
     def database_hash(self) -> str:
-        """Content hash of the LPV database in use."""
+        """Hash of the aircraft: of the LPV database and, where it has one of its own, of its profile."""
         return self._parts.database_hash
 
     @property
@@ -368,9 +376,8 @@ class Simulation:
         self._observe()
         airspeed = float(self._row[COLUMN.airspeed_kt]) * KNOT
         state, frequency = self._state, self.tables.nacelle.frequency
-        fault_apply(
-            state.faults, fault_change(fault, on=on, time=self.time), state.x, state.nacelle, frequency, airspeed
-        )
+        change = fault_change(fault, on=on, time=self.time, profile=self.database.profile)
+        fault_apply(state.faults, change, state.x, state.nacelle, frequency, airspeed)
         observe(self.tables, state, self._scratch, self._row)
 
     def disturb(self, change: Disturbance) -> None:

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.aircraft.variables import SCHEDULING_SPEED
 from rtsim.kernels.compiled import inner_kernel
 
 FloatArray = npt.NDArray[np.float64]
@@ -43,8 +42,6 @@ FLAG_NACELLE = 4
 FLAG_NO_TRIM = 8
 """Bit of the flags: a neighbouring grid point has no trim and was filled from the nearest airspeed that has one."""
 
-ALPHA_SPEED = SCHEDULING_SPEED
-"""V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
 GAP_NONE = math.radians(1.0)
 """Layers whose angles of attack differ by less than this are not blended [rad]."""
 GAP_FULL = math.radians(2.0)
@@ -104,6 +101,8 @@ class LpvTables(NamedTuple):
     """State number of each active column of A."""
     input_columns: IntArray
     """Input number of each active column of B."""
+    alpha_speed: float
+    """V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
     roles: IntArray
     """Form, sizes and positions of the variables that have a meaning here (``R_*``)."""
 
@@ -196,7 +195,7 @@ def _layer_step(alpha: float, here: float, beyond: float) -> float:
 
 
 @inner_kernel
-def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
+def scheduling_alpha(u: float, w: float, sine: float, cosine: float, speed: float) -> float:
     """Angle of attack as used for scheduling: with a headwind of V0 added, so that it is defined in hover.
 
     In rearward flight the headwind grows by the rearward speed; the angle then stays continuous at -V0, where it would
@@ -207,11 +206,12 @@ def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
         w: Air-relative velocity along body z [m/s].
         sine: Sine of the pitch attitude.
         cosine: Cosine of the pitch attitude.
+        speed: V0 [m/s].
 
     Returns:
         The angle [rad]; the pitch attitude in any level flight.
     """
-    headwind = ALPHA_SPEED + max(0.0, -(u * cosine + w * sine))
+    headwind = speed + max(0.0, -(u * cosine + w * sine))
     return math.atan2(w + headwind * sine, u + headwind * cosine)
 
 
@@ -287,7 +287,7 @@ def locate(
     if layers == 1:
         work[W_LAYER_SHARE] = 1.0
         return i, j
-    alpha = scheduling_alpha(u, w, sine, cosine)
+    alpha = scheduling_alpha(u, w, sine, cosine, tables.alpha_speed)
     work[W_ALPHA] = alpha
     # Walk outwards from the level layer. `gone` is the share that has left the layer before; the decelerating side
     # gets its part of what the accelerating side left, so that the shares always add up to one.

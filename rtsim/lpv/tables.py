@@ -8,12 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.errors import InputError
-from rtsim.lpv import schedule_kernels as kernels
-from rtsim.lpv.database import Database
-from rtsim.lpv.schedule_kernels import LpvTables
-from rtsim.lpv.variables import (
-    AUXILIARY_INPUTS,
+from rtsim.aircraft.variables import (
     GUST_INPUTS,
     NACELLE_INPUTS,
     RIGID_BODY_STATES,
@@ -21,6 +16,10 @@ from rtsim.lpv.variables import (
     position,
     required_position,
 )
+from rtsim.errors import InputError
+from rtsim.lpv import schedule_kernels as kernels
+from rtsim.lpv.database import Database
+from rtsim.lpv.schedule_kernels import LpvTables
 from rtsim.units import GRAVITY
 
 FloatArray = npt.NDArray[np.float64]
@@ -106,8 +105,18 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
         rows=rows,
         state_columns=state_columns,
         input_columns=input_columns,
+        alpha_speed=scheduling_speed(database),
         roles=roles,
     )
+
+
+def scheduling_speed(database: Database) -> float:
+    """V0 of the scheduling angle of attack [m/s].
+
+    Args:
+        database: The aircraft.
+    """
+    return database.profile.dimensions.number("scheduling_speed_m_s", low=0.1, high=100.0)
 
 
 def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
@@ -122,7 +131,7 @@ def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
     """
     u, w, pitch = (x[..., required_position(database.states, name, "scheduling")] for name in SCHEDULING_STATES)
     sine, cosine = np.sin(pitch), np.cos(pitch)
-    headwind = kernels.ALPHA_SPEED + np.maximum(0.0, -(u * cosine + w * sine))
+    headwind = scheduling_speed(database) + np.maximum(0.0, -(u * cosine + w * sine))
     return np.asarray(np.arctan2(w + headwind * sine, u + headwind * cosine))
 
 
@@ -152,7 +161,7 @@ def _roles(database: Database, form: int, level: int) -> npt.NDArray[np.int64]:
 def _first_auxiliary(database: Database) -> int:
     """Number of the first of the last inputs that are zero in most frames and in every trim."""
     first = len(database.inputs)
-    while first > 0 and database.inputs[first - 1].name in AUXILIARY_INPUTS:
+    while first > 0 and database.inputs[first - 1].role in ("flap", "drive"):
         if np.any(database.u_ref[..., first - 1]):
             break
         first -= 1

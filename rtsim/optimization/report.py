@@ -46,6 +46,8 @@ def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
         "corridor": spec.flight.corridor,
         "rate_hz": spec.flight.rate_hz,
     }
+    if spec.flight.database:
+        flight["database"] = spec.flight.database
     expectations = (
         ("keeps its distance to the corridor's boundaries", "corridor.worst_margin_kt", limits.margin_kt, None),
         ("holds altitude", "altitude_m.max_deviation", None, limits.altitude_m),

@@ -79,6 +79,7 @@ class SearchTable(_Strict):
 class FlightTable(_Strict):
     """``[flight]``: what flies."""
 
+    database: Annotated[str, Field(max_length=1000)] = ""
     plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
     outer_loop: Literal["integrators", "pi"] = "integrators"
     corridor: Literal["design", "flight"] = "design"
@@ -167,6 +168,9 @@ def load_spec(path: str | Path, changes: Mapping[str, Any] | None = None) -> Sea
         raise InputError(f"is not valid TOML: {error}", file=str(path), mend="correct this line") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+    flight = data.get("flight")
+    if isinstance(flight, dict) and isinstance(flight.get("database"), str) and flight["database"]:
+        flight["database"] = str((file.parent / flight["database"]).resolve())
     return checked_spec(data, changes, file=str(path))
 
 

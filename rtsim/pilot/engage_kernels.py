@@ -6,6 +6,7 @@ import numpy as np
 
 from rtsim.kernels.compiled import kernel
 from rtsim.pilot.layout_kernels import (
+    DISPLAY,
     INTEGRALS,
     LOOP_INTEGRATORS,
     N_KI_H,
@@ -15,6 +16,7 @@ from rtsim.pilot.layout_kernels import (
     N_Z_H,
     N_Z_V,
     OFFSETS,
+    PLANT,
     R_DELAY,
     R_DISPLAYS,
     R_END,
@@ -84,19 +86,19 @@ def mocm_engage(
     airspeed = observe(tables, x, reference, 0.0, 0.0, errors)
     state[S_FILTERED] = airspeed
     offset_at = last_at + n
-    state[offset_at] = errors[0]
-    state[offset_at + 2] = errors[1]
-    state[offset_at + 3] = errors[2]
+    state[offset_at] = errors[DISPLAY.airspeed]
+    state[offset_at + 2] = errors[DISPLAY.altitude]
+    state[offset_at + 3] = errors[DISPLAY.climb_rate]
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, trim)
     observe(tables, x, own, trim[0], 0.0, errors)
     interpolate(tables, tables.cells, airspeed, nacelle_angle, roles[R_END], cell)
     plant_reference(tables, own, trim, 0.0, state[last_at : last_at + n])
-    state[S_ESTIMATE + 0] = x[roles[R_U]] - state[last_at + 0]
-    state[S_ESTIMATE + 1] = x[roles[R_W]] - state[last_at + 1]
-    state[S_ESTIMATE + 2] = x[roles[R_Q]]
-    state[S_ESTIMATE + 3] = errors[3]
-    state[S_ESTIMATE + 4] = errors[1]
+    state[S_ESTIMATE + PLANT.u] = x[roles[R_U]] - state[last_at + PLANT.u]
+    state[S_ESTIMATE + PLANT.w] = x[roles[R_W]] - state[last_at + PLANT.w]
+    state[S_ESTIMATE + PLANT.q] = x[roles[R_Q]]
+    state[S_ESTIMATE + PLANT.pitch] = errors[DISPLAY.pitch]
+    state[S_ESTIMATE + PLANT.altitude] = errors[DISPLAY.altitude]
     for hand in range(hands):
         held = present[hand] - trim[1 + hand]
         if tables.lags[hand] >= 0:

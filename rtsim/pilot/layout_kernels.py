@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import RIGID_BODY_STATES
 from rtsim.kernels.compiled import inner_kernel
 
 FloatArray = npt.NDArray[np.float64]
@@ -66,6 +68,13 @@ N_Z_V = 8
 N_Z_H = 9
 N_DT = 10
 N_COUNT = 11
+
+PLANT: Any = namedtuple("_Plant", RIGID_BODY_STATES)(*range(len(RIGID_BODY_STATES)))
+"""Places of the rigid body among the design plant's states."""
+DISPLAYS = ("airspeed", "altitude", "climb_rate", "pitch", "pitch_rate")
+"""What the pilot sees; with integrators also ``airspeed_integral`` and ``altitude_integral``."""
+DISPLAY: Any = namedtuple("_Display", DISPLAYS)(*range(len(DISPLAYS)))
+"""Places of the displays."""
 
 SAME_CONTROL = 1e-9
 """Applied and demanded controls closer than this are the same (rounding must not freeze the integrals)."""
@@ -285,11 +294,11 @@ def observe(
     u = x[roles[R_U]]
     w = x[roles[R_W]]
     airspeed = u * cosine + w * sine
-    out[0] = airspeed - reference[REF_AIRSPEED]
-    out[1] = x[roles[R_ALTITUDE]] - reference[REF_ALTITUDE]
-    out[2] = u * sine - w * cosine - reference[REF_CLIMB]
-    out[3] = x[roles[R_PITCH]] - pitch
-    out[4] = x[roles[R_Q]] - pitch_rate
+    out[DISPLAY.airspeed] = airspeed - reference[REF_AIRSPEED]
+    out[DISPLAY.altitude] = x[roles[R_ALTITUDE]] - reference[REF_ALTITUDE]
+    out[DISPLAY.climb_rate] = u * sine - w * cosine - reference[REF_CLIMB]
+    out[DISPLAY.pitch] = x[roles[R_PITCH]] - pitch
+    out[DISPLAY.pitch_rate] = x[roles[R_Q]] - pitch_rate
     return float(airspeed)
 
 
@@ -311,11 +320,11 @@ def plant_reference(
     cosine = math.cos(trim[0])
     for k in range(roles[R_PLANT]):
         out[k] = 0.0
-    out[0] = reference[REF_AIRSPEED] * cosine + reference[REF_CLIMB] * sine
-    out[1] = reference[REF_AIRSPEED] * sine - reference[REF_CLIMB] * cosine
-    out[2] = pitch_rate
-    out[3] = trim[0]
-    out[4] = reference[REF_ALTITUDE]
+    out[PLANT.u] = reference[REF_AIRSPEED] * cosine + reference[REF_CLIMB] * sine
+    out[PLANT.w] = reference[REF_AIRSPEED] * sine - reference[REF_CLIMB] * cosine
+    out[PLANT.q] = pitch_rate
+    out[PLANT.pitch] = trim[0]
+    out[PLANT.altitude] = reference[REF_ALTITUDE]
     for hand in range(roles[R_HANDS]):
         if tables.lags[hand] >= 0:
             out[tables.lags[hand]] = trim[1 + hand]

@@ -34,6 +34,7 @@ from rtsim.pilot.layout_kernels import (
     CAPTURE_CLIMB,
     CAPTURE_CLIMB_RATE,
     CAPTURE_FREQUENCY,
+    DISPLAY,
     INTEGRALS,
     LARGEST_AIRSPEED_ERROR,
     LARGEST_ALTITUDE_ERROR,
@@ -44,6 +45,7 @@ from rtsim.pilot.layout_kernels import (
     N_KP_H,
     N_KP_V,
     OFFSETS,
+    PLANT,
     R_DELAY,
     R_DISPLAYS,
     R_END,
@@ -170,11 +172,11 @@ def _known_accelerations(
     for k in range(n):
         held.plant[k] = cell[tables.roles[R_N] + k] * nacelle_rate
     for c in range(tables.a_columns.shape[0]):
-        if tables.a_columns[c] == 2:
+        if tables.a_columns[c] == PLANT.q:
             for k in range(n):
                 held.plant[k] += cell[rows * c + k] * pitch_rate
-    held.plant[0] += own[REF_AIRSPEED_RATE] * math.cos(trim[0])
-    held.plant[1] += own[REF_AIRSPEED_RATE] * math.sin(trim[0])
+    held.plant[PLANT.u] += own[REF_AIRSPEED_RATE] * math.cos(trim[0])
+    held.plant[PLANT.w] += own[REF_AIRSPEED_RATE] * math.sin(trim[0])
 
 
 @inner_kernel
@@ -188,8 +190,8 @@ def _outer_loops(
             held.displays[roles[R_DISPLAYS] - INTEGRALS + k] = integrals[k]
         return
     numbers = tables.numbers
-    dv = -numbers[N_KP_V] * held.displays[0] - numbers[N_KI_V] * integrals[0]
-    dh = -numbers[N_KP_H] * held.displays[1] - numbers[N_KI_H] * integrals[1]
+    dv = -numbers[N_KP_V] * held.displays[DISPLAY.airspeed] - numbers[N_KI_V] * integrals[0]
+    dh = -numbers[N_KP_H] * held.displays[DISPLAY.altitude] - numbers[N_KI_H] * integrals[1]
     for hand in range(roles[R_HANDS]):
         held.command[hand] = outer_command(tables, cell, trim, own[REF_AIRSPEED], dv, dh, hand)
 
@@ -296,7 +298,7 @@ def mocm_advance_in(
     # the moving trim: what it moved since the last frame comes off the estimated deviation
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, trim)
-    pitch_rate = (trim[0] - state[last_at + 3]) / dt
+    pitch_rate = (trim[0] - state[last_at + PLANT.pitch]) / dt
     plant_reference(tables, own, trim, pitch_rate, target)
     for k in range(n):
         state[S_ESTIMATE + k] -= target[k] - state[last_at + k]
@@ -312,8 +314,8 @@ def mocm_advance_in(
     interpolate(tables, tables.cells, state[S_FILTERED], nacelle_angle, roles[R_END] if noisy else roles[R_V], cell)
     gains = gains_of(tables, cell)
     airspeed = observe(tables, x, own, trim[0], pitch_rate, held.displays)
-    error_v = held.displays[0]
-    error_h = held.displays[1]
+    error_v = held.displays[DISPLAY.airspeed]
+    error_h = held.displays[DISPLAY.altitude]
     _outer_loops(tables, cell, held, trim, own, state[integrals_at : integrals_at + INTEGRALS])
     _known_accelerations(tables, cell, held, trim, own, pitch_rate, nacelle_rate)
     frozen = limit_hands(tables, gains, held, y, trim)

@@ -15,15 +15,10 @@ from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
 from rtsim.protection.boundary import BoundaryName, load_boundary, model_corridor
 from rtsim.protection.law_data import SENSOR_COUNT
-from rtsim.protection.limits import LIMIT_KINDS, load_limits, protection_data
+from rtsim.protection.limits import WATCHED, LimitLevels, load_levels, load_limits
 from rtsim.protection.monitor_kernels import KIND_COUNT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
 from rtsim.units import DEGREE, INCH_POUND, KNOT
-
-WATCHED = (*LIMIT_KINDS, "time_to_limit")
-"""What has a margin and a level, in the order of the arrays."""
-UNIT_SCALE = {"kn": KNOT, "deg": DEGREE, "deg/s": DEGREE, "%": 0.01, "": 1.0, "m/s": 1.0, "s": 1.0}
-"""SI value of one unit of the levels' data."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +53,8 @@ class MarginHistory:
     """Predicted time until the corridor is left [s] (frames,)."""
     side: FloatArray
     """-1 low, 1 high, 0 none (frames,)."""
+    limit_levels: LimitLevels
+    """When each limit counts as exceeded."""
 
     def of(self, name: str) -> FloatArray:
         """Margin of one limit over time (frames,).
@@ -75,14 +72,12 @@ class MarginHistory:
             By limit: ``worst`` in the unit of the levels' data (kn, deg, %, ...), ``outside_s``, ``level``.
         """
         step = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 0.0
-        data = protection_data()["levels"]
         found = {}
         for k, name in enumerate(WATCHED):
-            scale = UNIT_SCALE[data[name]["unit"]]
             margins = self.margins[:, k]
             found[name] = {
-                "worst": float(margins.min()) / scale,
-                "outside_s": step * int(np.count_nonzero(margins < data[name]["threshold"][2] * scale)),
+                "worst": float(margins.min()) / float(self.limit_levels.scale[k]),
+                "outside_s": step * int(np.count_nonzero(margins < self.limit_levels.threshold[k, 2])),
                 "level": float(self.levels[:, k].max()),
             }
         return found
@@ -104,6 +99,7 @@ class MarginMonitor:
         database = load_database() if database is None else database
         self.dt = dt
         self.tables = monitor_tables(boundary, database)
+        self._limits = load_levels(database.profile)
         self._law = law_tables("monitor", database, dt=dt, boundary=boundary)
         self._law_state = np.zeros(law_data.LAW_STATE_SIZE)
         self._levels = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
@@ -160,7 +156,7 @@ class MarginMonitor:
         state = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
         monitor_kernels.watch(self.tables, sensors, ahead, self.dt, state, margins, levels)
         monitor_kernels.distances(self.tables, sensors, distance)
-        return MarginHistory(rows[:, COLUMN.time_s].copy(), margins, levels, distance, ahead, side)
+        return MarginHistory(rows[:, COLUMN.time_s].copy(), margins, levels, distance, ahead, side, self._limits)
 
 
 def monitor_tables(boundary: str, database: Database) -> MonitorTables:
@@ -170,10 +166,11 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         boundary: The corridor to watch.
         database: The plant whose trims the chart is compared with.
     """
-    corridor, limits, data = load_boundary(boundary, database), load_limits(), protection_data()["levels"]
-    scale = [UNIT_SCALE[data[name]["unit"]] for name in WATCHED]
-    threshold = np.array([[s * value for value in data[n]["threshold"]] for n, s in zip(WATCHED, scale, strict=True)])
-    hysteresis = np.array([s * data[n]["hysteresis"] for n, s in zip(WATCHED, scale, strict=True)])
+    corridor, limits, levels = (
+        load_boundary(boundary, database),
+        load_limits(database.profile),
+        load_levels(database.profile),
+    )
     return MonitorTables(
         chart=sample_boundary(corridor),
         corners=corridor.tables(),
@@ -187,10 +184,10 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         nacelle_forward=limits.nacelle_forward,
         nacelle_aft=limits.nacelle_aft,
         nacelle_rate=limits.nacelle_rate,
-        threshold=threshold,
-        hysteresis=hysteresis,
-        rise=data["rise_s"],
-        fall=data["fall_s"],
+        threshold=levels.threshold,
+        hysteresis=levels.hysteresis,
+        rise=levels.rise,
+        fall=levels.fall,
     )
 
 

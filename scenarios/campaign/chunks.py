@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -63,6 +64,10 @@ class Task:
     """Frames per second."""
     folder: str = ""
     """Where modules of laws are looked for besides the installed ones."""
+    database: str = ""
+    """LPV database of the aircraft, a file; empty: the shipped XV-15."""
+    aircraft_hash: str = ""
+    """Hash of that aircraft, which a worker must have too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,15 +118,28 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
     Args:
         task: The campaign.
         chunk: The piece.
+
+    Raises:
+        InputError: This worker has another aircraft.
     """
     spec = _spec(task.text, task.file)
-    bench = _bench(task.plant, spec.corridor, task.rate_hz)
+    logging.getLogger("rtsim.lpv.files.storage").setLevel(logging.ERROR)  # said where the campaign was started
+    bench = _bench(task.plant, spec.corridor, task.rate_hz, task.database)
+    if task.aircraft_hash != bench.aircraft_hash:
+        raise InputError(
+            "a worker has another aircraft than the campaign",
+            file=task.database or None,
+            key="database",
+            value=bench.aircraft_hash[:12],
+            allowed=task.aircraft_hash[:12],
+            mend="give every worker the same database, profile and version of rtsim",
+        )
     metrics = np.zeros((chunk.count, len(task.laws), METRIC_COUNT))
     seconds = np.zeros(len(task.laws))
     problems: list[tuple[int, int, str]] = []
     for k in range(chunk.count):
         run = chunk.first + k
-        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run)
+        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run, database=task.database)
         for number, law in enumerate(task.laws):
             begin = time.process_time()
             # The first run of every class asks laws in Python everything twice.
@@ -148,19 +166,20 @@ def fly_law(
     if law.compiled:
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
-        return bench.fly(plan, _python_laws(law.name, folder, bench.corridor), repeat=repeat, keep=keep)
+        return bench.fly(plan, _python_laws(law.name, folder, bench.corridor, bench.database), repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
 
 
-def law_chain(name: str, folder: str, boundary: BoundaryName = "flight") -> Sequence[LawSpec]:
+def law_chain(name: str, folder: str, boundary: BoundaryName = "flight", database: str = "") -> Sequence[LawSpec]:
     """Find a law, or several separated by commas.
 
     Args:
         name: What the user wrote.
         folder: Where modules are looked for besides the installed ones.
         boundary: Corridor that built-in laws of a chain keep to.
+        database: LPV database of the aircraft that they know, a file; empty: the shipped XV-15.
 
     Raises:
         InputError: There is no such law.
@@ -169,12 +188,12 @@ def law_chain(name: str, folder: str, boundary: BoundaryName = "flight") -> Sequ
 
     if folder and folder not in sys.path:
         sys.path.insert(0, folder)
-    return load_laws(name, boundary=boundary)
+    return load_laws(name, boundary=boundary, database=database)
 
 
 @functools.lru_cache(maxsize=8)
-def _python_laws(name: str, folder: str, boundary: BoundaryName) -> Sequence[LawSpec]:
-    return law_chain(name, folder, boundary)
+def _python_laws(name: str, folder: str, boundary: BoundaryName, database: str) -> Sequence[LawSpec]:
+    return law_chain(name, folder, boundary, database)
 
 
 @functools.lru_cache(maxsize=4)
@@ -186,8 +205,8 @@ def _spec(text: str, file: str) -> CampaignFile:
 
 
 @functools.lru_cache(maxsize=4)
-def _bench(plant: str, corridor: str, rate_hz: int) -> Bench:
-    return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz)  # type: ignore[arg-type]  # the file was checked
+def _bench(plant: str, corridor: str, rate_hz: int, database: str) -> Bench:
+    return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz, database=database)  # type: ignore[arg-type]  # the file was checked
 
 
 def present_folder() -> str:

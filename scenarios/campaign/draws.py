@@ -10,6 +10,7 @@ from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.faults import Fault
+from rtsim.lpv.files.storage import load_database
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
@@ -23,7 +24,7 @@ ATTEMPTS = 200
 """Starts drawn before a class is said to have none inside the corridor."""
 
 
-def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> FlightPlan:
+def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int, database: str = "") -> FlightPlan:
     """Draw one flight.
 
     Args:
@@ -31,6 +32,7 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
         seed: Its seed.
         class_number: Place of the class in the campaign.
         run: Number of the run within the class.
+        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
 
     Raises:
         InputError: No start of the class lies inside the corridor.
@@ -42,8 +44,9 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
         programme, start = scenario.programme, scenario.start
         duration = scenario.duration if item.duration_s is None else item.duration_s
     else:
-        start = _start(item, spec.corridor, generator)
-        programme = _programme(item, start, load_boundary(spec.corridor), generator)
+        corridor = load_boundary(spec.corridor, load_database(database or None))
+        start = _start(item, corridor, database, generator)
+        programme = _programme(item, start, corridor, generator)
         duration = spec.duration_s if item.duration_s is None else item.duration_s
     pulses = tuple(pulse for table in item.pulses for pulse in _pulses(table, generator))
     faults = tuple(_faults(item, generator))
@@ -67,10 +70,9 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
     )
 
 
-def _start(item: ClassTable, corridor_name: str, generator: Generator) -> ProgrammePoint:
+def _start(item: ClassTable, corridor: Corridor, database: str, generator: Generator) -> ProgrammePoint:
     table = item.start
     assert table is not None  # the file was checked
-    corridor = load_boundary(corridor_name)
     for _ in range(ATTEMPTS):
         nacelle = float(np.clip(draw(table.nacelle_deg, generator), 0.0, 90.0))
         angle = deg(nacelle)
@@ -83,7 +85,7 @@ def _start(item: ClassTable, corridor_name: str, generator: Generator) -> Progra
             airspeed = low + kt(draw(table.above_low_kt, generator))
         altitude = draw(table.altitude_m, generator)
         margin = min(airspeed - low, high - airspeed)
-        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle):
+        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle, database):
             return ProgrammePoint(airspeed, angle, altitude)
     raise InputError(
         f"no start of the class {item.name} lies inside the corridor and has a trim",
@@ -94,8 +96,8 @@ def _start(item: ClassTable, corridor_name: str, generator: Generator) -> Progra
 
 
 @functools.lru_cache(maxsize=64)
-def _has_trim(airspeed: float, angle: float) -> bool:
-    return has_trim("lpv", airspeed, angle)
+def _has_trim(airspeed: float, angle: float, database: str) -> bool:
+    return has_trim("lpv", airspeed, angle, database=database)
 
 
 def _programme(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> Programme:

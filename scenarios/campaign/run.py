@@ -13,6 +13,7 @@ import numpy as np
 
 import rtsim
 from rtsim.errors import InputError
+from rtsim.lpv.files.storage import load_database
 from scenarios.campaign.chunks import (
     ChunkResult,
     LawVariant,
@@ -49,6 +50,8 @@ class CampaignOptions:
     """Aircraft model; None: the file's."""
     rate_hz: int | None = None
     """Frames per second; None: the file's."""
+    database: str = ""
+    """LPV database of the aircraft, a file; empty: the shipped XV-15."""
     early_stop: bool = True
     """End as soon as the verdict is certain."""
     folder: Path | None = None
@@ -94,6 +97,8 @@ class CampaignResult:
             "law": self.task.laws[0].label,
             "seed": self.task.seed,
             "plant": self.task.plant,
+            "database": self.task.database,
+            "database_hash": self.task.aircraft_hash,
             "corridor_name": self.spec.corridor,
             "rate_hz": self.task.rate_hz,
             "runs": flown,
@@ -249,6 +254,8 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
         plant=options.plant or spec.plant,
         rate_hz=options.rate_hz or spec.rate_hz,
         folder=folder,
+        database=options.database,
+        aircraft_hash=load_database(options.database or None).aircraft_hash,
     )
 
 
@@ -258,7 +265,6 @@ def identity(task: Task) -> dict[str, Any]:
     Args:
         task: The campaign.
     """
-    from rtsim.lpv.files.storage import load_database
     from scenarios.flight.flight_setup import versions
 
     return {
@@ -269,7 +275,7 @@ def identity(task: Task) -> dict[str, Any]:
         "plant": task.plant,
         "rate_hz": task.rate_hz,
         "metrics": METRIC_COUNT,
-        "database": load_database().content_hash,
+        "database": task.aircraft_hash,
         "versions": versions() | {"rtsim": rtsim.__version__},
     }
 

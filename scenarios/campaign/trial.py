@@ -27,6 +27,8 @@ from rtsim.loop.data import (
 )
 from rtsim.loop.setup import FlightSetup, Parts, Plant, build_parts, start_state
 from rtsim.loop.simulation import END_REASONS
+from rtsim.lpv.files.storage import load_database
+from rtsim.lpv.flown import flown_database
 from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.protection import law_data
@@ -101,7 +103,7 @@ class TrialFlight:
 
 
 class Bench:
-    """Flies trials of one plant against one corridor; loads everything once."""
+    """Flies trials of one aircraft against one corridor; loads everything once."""
 
     def __init__(
         self,
@@ -109,6 +111,7 @@ class Bench:
         plant: Plant = "lpv",
         corridor: BoundaryName = "flight",
         rate_hz: int = 250,
+        database: str = "",
     ) -> None:
         """Remember what to fly; parts are loaded with the first flight.
 
@@ -116,13 +119,23 @@ class Bench:
             plant: Aircraft model.
             corridor: Boundaries that laws keep to and flights are judged by.
             rate_hz: Frames per second.
+            database: LPV database of the aircraft, a file; empty: the shipped XV-15.
+
+        Raises:
+            InputError: The database is missing or cannot be used.
         """
-        self.plant, self.corridor, self.rate_hz = plant, corridor, rate_hz
+        self.plant, self.corridor, self.rate_hz, self.database = plant, corridor, rate_hz, database
+        self._aircraft = load_database(database or None)
         self._parts: dict[tuple[str, bool], Parts] = {}
         self._laws: dict[tuple[str, float], law_data.ProtectionTables] = {}
         self._rows = np.zeros((0, SIGNAL_COUNT))
-        limits = load_limits()
+        limits = load_limits(self._aircraft.profile)
         self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
+
+    @property
+    def aircraft_hash(self) -> str:
+        """Hash of the aircraft's database and profile."""
+        return self._aircraft.aircraft_hash
 
     @property
     def dt(self) -> float:
@@ -138,9 +151,8 @@ class Bench:
         """
         key = (name, buffer)
         if key not in self._laws:
-            from rtsim.lpv.files.storage import load_database
-
-            tables = law_tables(name, load_database(), dt=self.dt, boundary=self.corridor)
+            flown = flown_database(self._aircraft, self.database or None)
+            tables = law_tables(name, flown, dt=self.dt, boundary=self.corridor)
             settings = tables.settings
             self._laws[key] = tables._replace(
                 settings=settings._replace(
@@ -189,7 +201,7 @@ class Bench:
             flown = self._fly_compiled(flying) if pilot is None else fly_in_python(flying, None, pilot)[0]
         else:
             assert not isinstance(law, str)  # a name is a compiled law
-            chain = LawChain(law, dt=self.dt, remember=repeat)
+            chain = LawChain(law, dt=self.dt, remember=repeat, profile=self._aircraft.profile)
             flown, slow = fly_in_python(flying, chain, pilot)
             if repeat:
                 chain.unrepeatable()
@@ -241,6 +253,7 @@ class Bench:
             governor=plan.governor,
             air=plan.air,
             faults=plan.faults,
+            database=self.database,
         )
         parts = self._parts_of(setup, law)
         pilot_random = stream_generator(plan.seed, STREAM_PILOT)
@@ -273,15 +286,15 @@ class Bench:
         parts = self._parts[key]
         assert setup.start_airspeed is not None  # a plan has a start
         assert setup.start_nacelle is not None
-        x, u = _trim(setup.plant, setup.start_airspeed, setup.start_nacelle)
+        x, u = _trim(setup.plant, setup.start_airspeed, setup.start_nacelle, self.database)
         x = x.copy()
         x[STATE.altitude] = setup.start_altitude
         programme = setup.programme
         points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
         tables = parts.tables._replace(
             wind=float(setup.wind),
-            gusts=gust_tables(setup.air),
-            faults=fault_tables(setup.faults),
+            gusts=gust_tables(setup.air, self._aircraft.profile),
+            faults=fault_tables(setup.faults, self._aircraft.profile),
             protection=law,
             programme=points,
         )
@@ -313,17 +326,18 @@ class Flying:
 
 
 @functools.lru_cache(maxsize=8)
-def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
+def _trim(plant: Plant, airspeed: float, nacelle: float, database: str) -> tuple[FloatArray, FloatArray]:
     """Trimmed state and inputs at a start, altitude 0; kept, since a twin starts like its flight."""
     from rtsim.aircraft import Condition
     from rtsim.aircraft.xv15.model import Xv15
-    from rtsim.lpv.aircraft import load_aircraft
+    from rtsim.lpv.aircraft import LpvAircraft
 
     if plant == "nonlinear":
         trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
         converged, x, u = trim.converged, trim.x, trim.u
     else:
-        point = load_aircraft().trim(airspeed=airspeed, nacelle=nacelle)
+        aircraft = LpvAircraft(flown_database(load_database(database or None), database or None))
+        point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
         converged, x, u = point.converged, point.x, point.u
     if not converged:
         raise InputError(
@@ -335,16 +349,17 @@ def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, Fl
     return x.copy(), u.copy()
 
 
-def has_trim(plant: Plant, airspeed: float, nacelle: float) -> bool:
+def has_trim(plant: Plant, airspeed: float, nacelle: float, *, database: str = "") -> bool:
     """Whether a flight can start somewhere.
 
     Args:
         plant: Aircraft model.
         airspeed: Airspeed [m/s].
         nacelle: Nacelle angle [rad].
+        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
     """
     try:
-        _trim(plant, airspeed, nacelle)
+        _trim(plant, airspeed, nacelle, database)
     except InputError:
         return False
     return True

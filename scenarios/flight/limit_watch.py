@@ -16,8 +16,8 @@ from rtsim.corridor import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, protection_data
-from rtsim.protection.monitor import UNIT_SCALE, WATCHED, monitor_tables, sensors_of_rows
+from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, WATCHED, load_levels
+from rtsim.protection.monitor import monitor_tables, sensors_of_rows
 from rtsim.protection.monitor_kernels import FAR, KIND_COUNT, LEVEL_STATE_SIZE, MonitorTables, watch
 from telemetry.log.format import LogEvent
 
@@ -47,13 +47,12 @@ class LimitWatch:
             dt: Length of a frame [s].
             database: LPV database of the aircraft, a file; empty: the shipped XV-15.
         """
-        self._tables = _tables(corridor_name, load_database(database or None))
+        aircraft = load_database(database or None)
+        self._tables = _tables(corridor_name, aircraft)
         self._dt, self._tell = dt, tell
         self._noted: list[LogEvent] = []
-        levels = protection_data()["levels"]
-        self._scale = np.array([UNIT_SCALE[levels[name]["unit"]] for name in WATCHED])
-        self._units = [str(levels[name]["unit"]) for name in WATCHED]
-        self._outside = np.array([levels[name]["threshold"][2] for name in WATCHED]) * self._scale
+        levels = load_levels(aircraft.profile)
+        self._scale, self._units, self._outside = levels.scale, levels.units, levels.threshold[:, 2]
         self._waiting = np.empty((BATCH_ROWS, SIGNAL_COUNT))
         self._fill = 0
         self._frame = -1

@@ -19,7 +19,6 @@ from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
 from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
 from rtsim.pilot.layout_kernels import PilotTables
 from rtsim.pilot.schedule import OuterLoop
-from rtsim.pilot.weights import PilotSettings
 from rtsim.programme import Programme
 from rtsim.random_streams import STREAM_TURBULENCE, stream_generator
 
@@ -39,8 +38,8 @@ class Variant:
     """Aircraft model."""
     outer_loop: OuterLoop = "integrators"
     """How the pilot holds airspeed and altitude."""
-    pilot: PilotSettings | None = None
-    """Pilot settings other than the shipped ones; the gains are then designed anew."""
+    pilot_delay: float | None = None
+    """Delay of the pilot other than the aircraft's [s]; the gains are then designed anew."""
     turbulence: float = 0.0
     """Wind at 20 ft that sets the turbulence [m/s]; 0 is calm."""
     seed: int = 0
@@ -53,7 +52,7 @@ VARIANTS: tuple[Variant, ...] = (
     Variant(name="nonlinear", title="the nonlinear model", plant="nonlinear"),
     Variant(name="two-variable", title="the paper's two-variable LPV", plant="lpv-plain"),
     Variant(name="pi", title="the paper's outer PI loops", outer_loop="pi"),
-    Variant(name="slow-pilot", title="a pilot with 0.25 s of delay", pilot=PilotSettings(delay=0.25)),
+    Variant(name="slow-pilot", title="a pilot with 0.25 s of delay", pilot_delay=0.25),
 )
 """What every claim about a flight is judged on; the first one counts, the others show how far it carries."""
 
@@ -120,7 +119,7 @@ class Flyer:
             jobs: Processes for the design of a pilot.
         """
         self.variant = variant
-        self._pilot = _designed_pilot(variant, jobs) if variant.pilot is not None else None
+        self._pilot = _designed_pilot(variant, jobs) if variant.pilot_delay is not None else None
 
     def fly(self, name: str, path: ConversionPath) -> Flight:
         """Fly one path to its end.
@@ -157,13 +156,16 @@ class Flyer:
 
 
 def _designed_pilot(variant: Variant, jobs: int) -> PilotTables:
-    """Gains of a pilot with other settings, at every grid point."""
-    from rtsim.lpv.aircraft import load_aircraft
+    """Gains of a pilot with another delay, at every grid point."""
+    from rtsim.lpv.files.storage import load_database
     from rtsim.pilot.schedule import design_schedule
     from rtsim.pilot.tables import pack_pilot
+    from rtsim.pilot.weights import pilot_settings
 
-    database = load_aircraft().database
-    schedule = design_schedule(database, outer_loop=variant.outer_loop, settings=variant.pilot, jobs=jobs)
+    database = load_database()
+    assert variant.pilot_delay is not None  # asked for by the caller only where there is one
+    settings = dataclasses.replace(pilot_settings(database.profile), delay=variant.pilot_delay)
+    schedule = design_schedule(database, outer_loop=variant.outer_loop, settings=settings, jobs=jobs)
     return pack_pilot(database, schedule, dt=1 / RATE_HZ)
 
 

@@ -64,7 +64,9 @@ def work_amount(variants: tuple[Variant, ...] = VARIANTS) -> int:
         variants: Who flies.
     """
     return (
-        len(variants) * len(paper_paths()) + DESIGN_WEIGHT * sum(variant.pilot is not None for variant in variants) + 2
+        len(variants) * len(paper_paths())
+        + DESIGN_WEIGHT * sum(variant.pilot_delay is not None for variant in variants)
+        + 2
     )
 
 
@@ -118,8 +120,8 @@ def _tasks(variants: tuple[Variant, ...]) -> list[tuple[Variant, tuple[str, ...]
     """Pieces of work, the longest first, so that the processes end together; a pilot is designed only once."""
     names = tuple(paper_paths())
     tasks: list[tuple[Variant, tuple[str, ...]]] = []
-    for variant in sorted(variants, key=lambda variant: (variant.pilot is None, variant.plant != "nonlinear")):
-        tasks += [(variant, names)] if variant.pilot is not None else [(variant, (name,)) for name in names]
+    for variant in sorted(variants, key=lambda variant: (variant.pilot_delay is None, variant.plant != "nonlinear")):
+        tasks += [(variant, names)] if variant.pilot_delay is not None else [(variant, (name,)) for name in names]
     return tasks
 
 
@@ -133,7 +135,7 @@ def _all_flown(variants: tuple[Variant, ...], jobs: int, advance: Callable[[floa
         work = (delayed(_fly_variant)(variant, names) for variant, names in tasks)
         parts = Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
     for part in parts:
-        advance(len(part.measures) + (DESIGN_WEIGHT if part.variant.pilot is not None else 0))
+        advance(len(part.measures) + (DESIGN_WEIGHT if part.variant.pilot_delay is not None else 0))
         yield part
 
 

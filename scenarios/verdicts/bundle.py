@@ -72,7 +72,8 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
 
 def _commands(case: Case, logs: dict[str, Any]) -> list[str]:
     law = shlex.quote(case.law)
-    commands = [f"rtsim test scenario.toml --protection {law} --plant {case.scenario.plant}"]
+    database = f" --database {shlex.quote(case.scenario.database)}" if case.scenario.database else ""
+    commands = [f"rtsim test scenario.toml --protection {law} --plant {case.scenario.plant}{database}"]
     return commands + [f"rtsim replay {item['log']}" for item in logs.values()]
 
 

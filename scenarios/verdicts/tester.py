@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import flight_metrics
 from rtsim.measures.trial_metrics import TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
@@ -121,6 +122,7 @@ class Case:
             "error": self.error,
             "seed": self.scenario.seed,
             "plant": self.scenario.plant,
+            "database": self.scenario.database,
             "corridor_name": self.scenario.corridor_name,
             "failures": [finding.sentence for finding in self.failures],
             "expectations": [
@@ -145,19 +147,22 @@ class Case:
 class Tester:
     """Flies cases; keeps what is costly to load."""
 
-    def __init__(self, *, law: str | None = None, plant: PlantName | None = None) -> None:
+    def __init__(self, *, law: str | None = None, plant: PlantName | None = None, database: str | None = None) -> None:
         """Remember what to test.
 
         Args:
             law: Law under test in every scenario; None: each scenario's own.
             plant: Aircraft model in every scenario; None: each scenario's own.
+            database: LPV database of the aircraft in every scenario, a file; None: each scenario's own.
 
         Raises:
-            InputError: There is no such law.
+            InputError: There is no such law, or the database cannot be used.
         """
-        self._law, self._plant = law, plant
+        self._law, self._plant, self._database = law, plant, database
         self._folder = present_folder()
-        self._benches: dict[tuple[str, str, int], Bench] = {}
+        self._benches: dict[tuple[str, str, int, str], Bench] = {}
+        if database is not None:
+            load_database(database or None)
         if law is not None:
             law_chain(law, self._folder)
 
@@ -172,7 +177,10 @@ class Tester:
         """
         # Tests judge by the flight corridor, with laws and without, unless the scenario names another.
         scenario = dataclasses.replace(
-            scenario, plant=self._plant or scenario.plant, corridor=scenario.corridor or TEST_CORRIDOR
+            scenario,
+            plant=self._plant or scenario.plant,
+            corridor=scenario.corridor or TEST_CORRIDOR,
+            database=scenario.database if self._database is None else self._database,
         )
         if scenario.trial is None:
             return self._flight_case(scenario)
@@ -182,9 +190,14 @@ class Tester:
         begin = time.perf_counter()
         law = self._law or trial.law
         law_chain(law, self._folder)
-        key = (scenario.plant, scenario.corridor_name, scenario.rate_hz)
+        key = (scenario.plant, scenario.corridor_name, scenario.rate_hz, scenario.database)
         if key not in self._benches:
-            self._benches[key] = Bench(plant=scenario.plant, corridor=scenario.corridor_name, rate_hz=scenario.rate_hz)
+            self._benches[key] = Bench(
+                plant=scenario.plant,
+                corridor=scenario.corridor_name,
+                rate_hz=scenario.rate_hz,
+                database=scenario.database,
+            )
         bench = self._benches[key]
         plan = plan_of(scenario)
         off = bench.fly(plan, "off", keep=True)

@@ -15,8 +15,8 @@ from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.law_data import SENSOR_COUNT
-from rtsim.protection.limits import LIMIT_KINDS
-from rtsim.protection.monitor import WATCHED, MarginHistory, sensor_array, sensors_of_rows, severity
+from rtsim.protection.limits import LIMIT_KINDS, WATCHED
+from rtsim.protection.monitor import MarginHistory, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 CALM = Sensors(
