@@ -2,8 +2,8 @@
 
 Two aircraft of one shape in one gravity are *Froude-similar*: with lengths times s, times go with the square root of s,
 masses and forces with s^3, and angles do not change. Every number of an LPV database then scales by the units of its
-variables, which are data of the database; nothing here knows a variable by name. (Mach and Reynolds numbers do not scale:
-a real aircraft of this size would differ.)
+variables, which are data of the database; nothing here knows a variable by name. (Mach and Reynolds numbers do not
+scale: a real aircraft of this size would differ.)
 
     python examples/second_tiltrotor/make_aircraft.py OUT
 
@@ -38,10 +38,9 @@ POWERS = {
     "kg": 3.0, "N": 3.0, "N m": 4.0, "W": 3.5,
 }  # fmt: skip
 """Power of the length scale with which a unit goes."""
-AIRSPEEDS_KT = (-20, -10, 0, 10, 20, 30, 40, 50, 60, 67, 74, 81, 88, 95, 102, 109, 116, 123, 130, 140, 150, 160, 170,
-                180, 200, 220, 240, 260)  # fmt: skip
+AIRSPEEDS_KT = (-20, -10, 0, 10, 20, 30, 40, 50, 60, 74, 88, 102, 116, 130, 140, 150, 160, 170, 180, 200, 230, 260)
 """Airspeeds of the XV-15's grid that are kept."""
-NACELLES_DEG = (0.0, 0.5, 10.0, 20.0, 30.0, 40.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0, 85.0, 90.0)
+NACELLES_DEG = (0.0, 0.5, 15.0, 30.0, 40.0, 50.0, 60.0, 67.5, 75.0, 80.0, 85.0, 90.0)
 """Nacelle angles that are kept."""
 
 
@@ -122,4 +121,4 @@ def make(folder: Path, *, jobs: int = 1, outer_loops: Sequence[OuterLoop] = OUTE
 
 
 if __name__ == "__main__":
-    print(make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE, jobs=2))
+    print(make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE, jobs=2))  # noqa: T201

@@ -27,7 +27,7 @@ EngineRating = Literal["contingency", "takeoff", "military", "normal"]
 
 ACTUATORS: tuple[Actuator, ...] = ("collective", "cyclic", "elevator")
 """Actuators that can fail, in the order of the aircraft's states."""
-LARGEST_POWER = 1e8
+LARGEST_POWER = 1e7
 """Largest power left to a failing engine [W]; what the aircraft's engine gives at most counts besides."""
 
 

@@ -15,7 +15,7 @@ from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.law_data import SENSOR_COUNT
-from rtsim.protection.limits import LIMIT_KINDS, WATCHED
+from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
 from rtsim.protection.monitor import MarginHistory, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
@@ -200,7 +200,7 @@ def history_of(margin, predicted):
     margins = np.full((len(margin), kernels.KIND_COUNT), 10.0)
     margins[:, kernels.KIND_STALL] = margin
     zeros = np.zeros(len(margin))
-    return MarginHistory(time, margins, margins * 0.0, zeros, np.asarray(predicted, float), zeros)
+    return MarginHistory(time, margins, margins * 0.0, zeros, np.asarray(predicted, float), zeros, load_levels())
 
 
 def test_assessment_of_a_perfect_and_of_a_late_prediction():
