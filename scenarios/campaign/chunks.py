@@ -123,7 +123,6 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
         InputError: This worker has another aircraft.
     """
     spec = _spec(task.text, task.file)
-    logging.getLogger("rtsim.lpv.files.storage").setLevel(logging.ERROR)  # said where the campaign was started
     bench = _bench(task.plant, spec.corridor, task.rate_hz, task.database)
     if task.aircraft_hash != bench.aircraft_hash:
         raise InputError(
@@ -206,7 +205,13 @@ def _spec(text: str, file: str) -> CampaignFile:
 
 @functools.lru_cache(maxsize=4)
 def _bench(plant: str, corridor: str, rate_hz: int, database: str) -> Bench:
-    return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz, database=database)  # type: ignore[arg-type]  # the file was checked
+    log = logging.getLogger("rtsim.lpv.files.storage")
+    level = log.level
+    log.setLevel(logging.ERROR)  # what the aircraft borrows was said where the campaign was started
+    try:
+        return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz, database=database)  # type: ignore[arg-type]  # checked
+    finally:
+        log.setLevel(level)
 
 
 def present_folder() -> str:
