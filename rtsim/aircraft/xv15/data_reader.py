@@ -36,7 +36,7 @@ NACELLE_GRID = np.radians(np.arange(0.0, 96.0, 1.0))
 
 def read_data() -> tuple[Data, Data]:
     """The sourced inputs and our choices, as printed."""
-    folder = files("rtsim.aircraft") / "data"
+    folder = files("rtsim.aircraft.xv15") / "data"
     return (
         tomllib.loads((folder / "xv15_inputs.toml").read_text()),
         tomllib.loads((folder / "model_choices.toml").read_text()),
