@@ -29,6 +29,7 @@ from rtsim.aids.aids_kernels import (
 from rtsim.aircraft.variables import FLAP_INPUTS, position
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
+from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import settled
 from rtsim.units import deg
@@ -78,22 +79,24 @@ def design_aids(database: Database) -> AidTables:
         maps[place] = -reduced_b[..., q, column] / reduced_b[..., q, stick]
     part = database.profile.aids
     blend = part.numbers("blend_nacelle_deg", low=0.0, high=95.0, count=2, rises=True)
-    return AidTables(
-        airspeed=database.airspeed,
-        nacelle=database.nacelle,
-        maps=maps,
-        schedule_time=part.number("schedule_time_s", low=0.01, high=100.0),
-        damping=part.number("damping_per_s", low=0.0, high=20.0),
-        attitude_frequency=part.number("attitude_frequency_rad_s", low=0.01, high=20.0),
-        attitude_damping=part.number("attitude_damping", low=0.0, high=5.0),
-        authority=part.number("authority", low=0.0, high=1.0),
-        rate_command=deg(part.number("rate_command_deg_s", low=0.1, high=100.0)),
-        dead_zone=part.number("dead_zone", low=0.0, high=0.5),
-        altitude_frequency=part.number("altitude_frequency_rad_s", low=0.01, high=10.0),
-        airspeed_frequency=part.number("airspeed_frequency_rad_s", low=0.01, high=10.0),
-        integral_time=part.number("integral_time_s", low=0.1, high=1000.0),
-        fade_time=part.number("fade_time_s", low=0.0, high=100.0),
-        blend=(deg(blend[0]), deg(blend[1])),
+    return packed(
+        AidTables(
+            airspeed=database.airspeed,
+            nacelle=database.nacelle,
+            maps=maps,
+            schedule_time=part.number("schedule_time_s", low=0.01, high=100.0),
+            damping=part.number("damping_per_s", low=0.0, high=20.0),
+            attitude_frequency=part.number("attitude_frequency_rad_s", low=0.01, high=20.0),
+            attitude_damping=part.number("attitude_damping", low=0.0, high=5.0),
+            authority=part.number("authority", low=0.0, high=1.0),
+            rate_command=deg(part.number("rate_command_deg_s", low=0.1, high=100.0)),
+            dead_zone=part.number("dead_zone", low=0.0, high=0.5),
+            altitude_frequency=part.number("altitude_frequency_rad_s", low=0.01, high=10.0),
+            airspeed_frequency=part.number("airspeed_frequency_rad_s", low=0.01, high=10.0),
+            integral_time=part.number("integral_time_s", low=0.1, high=1000.0),
+            fade_time=part.number("fade_time_s", low=0.0, high=100.0),
+            blend=(deg(blend[0]), deg(blend[1])),
+        )
     )
 
 

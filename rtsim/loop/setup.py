@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -11,29 +12,36 @@ from rtsim.aids import AidName, SwitchName, design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft import INPUTS, OUTPUTS, STATE, STATES, Condition
 from rtsim.aircraft.controls import control_tables
-from rtsim.aircraft.variables import AUXILIARY_INPUTS
-from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
+from rtsim.aircraft.variables import AUXILIARY_INPUTS, of_role
+from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
-from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
+from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import COLUMN, FloatArray
-from rtsim.loop import advance_kernels as kernels
+from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.packed import Address, packed
+from rtsim.loop import frame_kernels as frames_of
 from rtsim.loop.data import (
-    CLOCK_MODE,
-    CLOCK_SIZE,
-    MODE_EXTERNAL,
-    MODE_MOCM,
-    TARGET_SIZE,
+    CHANNEL,
+    CLOCK,
+    HELD,
+    MODES,
+    MOTION,
+    STATION,
+    TARGET,
+    PlantTables,
     Scratch,
+    ScriptTables,
     SimulationState,
     SimulationTables,
 )
-from rtsim.loop.observe_kernels import observe
-from rtsim.loop.plant_kernels import AircraftFrame
+from rtsim.loop.flying import Flying, Measure, new_streams
+from rtsim.loop.script import Pulse, pulse_table
+from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
@@ -49,7 +57,7 @@ from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme
 from rtsim.protection.boundary import BoundaryName, load_boundary
 from rtsim.protection.chain import compiled_law
-from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE
+from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
@@ -100,6 +108,10 @@ class FlightSetup:
     """Whether the governor holds the rotor speed at frame 0, whoever flies."""
     air: AirSpecification = CALM
     """Gusts and turbulence."""
+    pulses: tuple[Pulse, ...] = ()
+    """What scripted hands do to the controls besides the pilot."""
+    reaction: float | None = None
+    """A pilot who yields: how long a warning lasts before he gives up his plan [s]; None: he never does."""
     faults: tuple[Fault, ...] = ()
     """Failures and their times."""
     automatic_nacelle: AutomaticNacelle | None = None
@@ -115,12 +127,12 @@ class FlightSetup:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Tables and work space of one simulation."""
+    """Everything of a flight that flying does not change."""
 
     tables: SimulationTables
     """Parameters of the frame."""
-    scratch: Scratch
-    """Work space of the frame."""
+    nonlinear: bool
+    """The nonlinear aircraft flies."""
     noise_width: int
     """Standard normals the pilot takes per frame; 0 with the noise off."""
     database: Database = field(repr=False)
@@ -143,8 +155,49 @@ def _start(setup: FlightSetup) -> tuple[float, float, float]:
     return airspeed, nacelle, altitude
 
 
+@functools.lru_cache(maxsize=16)
+def start_trim(nonlinear: bool, database: Database, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
+    """Trimmed state and inputs in level flight, altitude 0, read-only; kept, since batches start alike.
+
+    Args:
+        nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
+        database: The LPV aircraft.
+        airspeed: Airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+
+    Raises:
+        InputError: There is no trim.
+    """
+    if nonlinear:
+        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
+        converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
+    else:
+        point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=nacelle)
+        converged, x, u = point.converged, point.x.copy(), point.u.copy()
+    if not converged:
+        raise InputError(
+            "the aircraft has no level-flight trim there",
+            key="start",
+            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
+            mend="start inside the conversion corridor (rtsim corridor shows it)",
+        )
+    x.setflags(write=False)
+    u.setflags(write=False)
+    return x, u
+
+
+@functools.lru_cache(maxsize=8)
+def _corridor_tables(name: BoundaryName, database: Database) -> CorridorTables:
+    return packed(load_boundary(name, database).tables())
+
+
+@functools.lru_cache(maxsize=16)
+def _law(name: str, boundary: BoundaryName, database: Database, dt: float) -> ProtectionTables:
+    return packed(law_tables(name, database, dt=dt, boundary=boundary))
+
+
 def build_parts(setup: FlightSetup) -> Parts:
-    """Load database, gains and corridor, and trim at the start.
+    """Load database, gains and corridor, and trim at the start; everything costly is loaded once and shared.
 
     Args:
         setup: The flight.
@@ -155,87 +208,86 @@ def build_parts(setup: FlightSetup) -> Parts:
     loaded = load_database(setup.database or None)
     database = flown_database(loaded, setup.database or None)
     profile = database.profile
-    if setup.plant == "nonlinear" and not profile.is_xv15:
+    nonlinear = setup.plant == "nonlinear"
+    if nonlinear and not profile.is_xv15:
         raise InputError(
             f"there is no nonlinear model of the {profile.name}", key="plant", value=setup.plant,
             allowed="lpv, lpv-plain", mend="fly the LPV aircraft",
         )  # fmt: skip
-    lpv_aircraft = LpvAircraft(database)
-    nonlinear_aircraft = Xv15.load()
+    own = Xv15.load().tables
     airspeed, nacelle, altitude = _start(setup)
-    if setup.plant == "nonlinear":
-        trim = nonlinear_aircraft.trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
-        converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
-    else:
-        point = lpv_aircraft.trim(airspeed=airspeed, nacelle=nacelle)
-        converged, x, u = point.converged, point.x.copy(), point.u.copy()
-    if not converged:
-        raise InputError(
-            "the aircraft has no level-flight trim there",
-            key="start",
-            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
-            mend="start inside the conversion corridor (rtsim corridor shows it)",
-        )
+    x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle))
     x[STATE.altitude] = altitude
     programme = setup.programme
-    own = nonlinear_aircraft.tables
+    dt = 1.0 / setup.rate_hz
+    pilot = load_pilot_tables(database, setup.outer_loop, dt=dt)
     tables = SimulationTables(
-        dt=1.0 / setup.rate_hz,
+        dt=dt,
         wind=float(setup.wind),
-        lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
-        aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, control_tables(profile)),
+        plant=PlantTables(
+            aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[setup.plant])),
+            configuration=own.configuration,
+            controls=control_tables(profile),
+        ),
         nacelle=load_nacelle_tables(profile),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
-        corridor=load_boundary(setup.corridor, database).tables(),
-        pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
+        corridor=_corridor_tables(setup.corridor, database),
+        pilot=pilot,
         flaps=load_flap_tables(profile),
         drive=load_drive_tables(profile, governed_speed=database.rotor_speed),
         aids=design_aids(database),
         gusts=gust_tables(setup.air, profile),
         faults=fault_tables(setup.faults, profile),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
-        protection=law_tables(
-            compiled_law(load_laws(setup.protection)) or "monitor",
-            database,
-            dt=1.0 / setup.rate_hz,
-            boundary=setup.protection_boundary,
+        protection=_law(
+            compiled_law(load_laws(setup.protection)) or "monitor", setup.protection_boundary, database, dt
         ),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
+        script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
         reference_frequency=REFERENCE_FREQUENCY,
-    )
-    states = len(STATES)
-    work = max(work_size(tables.lpv), nonlinear.WORK_COUNT + 6 * states)
-    scratch = Scratch(
-        work=np.zeros(work),
-        y=np.zeros(len(OUTPUTS)),
-        xdot=np.zeros(states),
-        path=np.zeros((3, 3)),
-        motion=np.zeros(3),
-        scheduled=np.zeros(1),
-        flaps=np.zeros(3),
-        margins=np.zeros(MARGIN_COUNT),
-        shown=np.zeros(1 + MARGIN_COUNT),
-        seen=np.zeros(states),
-        target=np.zeros(TARGET_SIZE),
-        command=np.zeros(3),
-        hands=np.zeros(2),
-        pilot=np.zeros(pilot_work_size(tables.pilot)),
-        asked=np.zeros(3),
-        planned=np.zeros(3),
-        gust=np.zeros(3),
-        sensors=np.zeros(SENSOR_COUNT),
-        limited=np.zeros(3),
-        law=np.zeros(WORK_SIZE),
     )
     return Parts(
         tables=tables,
-        scratch=scratch,
-        noise_width=noise_width(tables.pilot) if setup.pilot_noise else 0,
+        nonlinear=nonlinear,
+        noise_width=interpreted(noise_width)(pilot) if setup.pilot_noise else 0,
         database=database,
         database_hash=loaded.aircraft_hash,
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
         start_u=u,
+    )
+
+
+def new_scratch(tables: SimulationTables) -> Scratch:
+    """Work space for a flight.
+
+    Args:
+        tables: What flies.
+    """
+    states = len(STATES)
+    work = nonlinear_kernels.WORK_COUNT + 6 * states
+    lpv = tables.plant.aircraft.target
+    if hasattr(lpv, "cells"):
+        work = max(work, interpreted(work_size)(lpv))
+    return Scratch(
+        work=np.zeros(work),
+        y=np.zeros(len(OUTPUTS)),
+        xdot=np.zeros(states),
+        path=np.zeros((3, 3)),
+        motion=np.zeros(MOTION.size),
+        scheduled=np.zeros(1),
+        flaps=np.zeros(3),
+        margins=np.zeros(MARGIN_COUNT),
+        shown=np.zeros(1 + MARGIN_COUNT),
+        seen=np.zeros(states),
+        target=np.zeros(TARGET.size),
+        command=np.zeros((STATION.size, CHANNEL.size)),
+        pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
+        planned=np.zeros(3),
+        gust=np.zeros(3),
+        sensors=np.zeros(SENSOR_COUNT),
+        law=np.zeros(WORK_SIZE),
+        row=np.zeros(SIGNAL_COUNT),
     )
 
 
@@ -267,7 +319,7 @@ def needed_aid_error(name: str) -> InputError:
 
 
 def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> SimulationState:
-    """The state at frame 0: trimmed, filters at rest, the pilot engaged without a step.
+    """The state at frame 0, trimmed, filters at rest; the pilot is yet to be engaged.
 
     Args:
         setup: The flight.
@@ -275,10 +327,12 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         air_normals: Three standard normals: the turbulence at the start.
     """
     airspeed, nacelle, _ = _start(setup)
-    clock = np.zeros(CLOCK_SIZE)
-    clock[CLOCK_MODE] = MODE_MOCM if setup.pilot == "mocm" else MODE_EXTERNAL
+    clock = np.zeros(CLOCK.size)
+    clock[CLOCK.mode] = MODES[setup.pilot]
     u = parts.start_u.copy()
-    u[[place for place, variable in enumerate(INPUTS) if variable.role != "pilot"]] = 0.0
+    u[[place for place in range(len(INPUTS)) if place not in of_role(INPUTS, "pilot")]] = 0.0
+    held = np.full(HELD.size, np.nan)
+    held[HELD.stick_reason :] = 0.0
     state = SimulationState(
         x=parts.start_x.copy(),
         u=u,
@@ -286,7 +340,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         automatic=np.zeros(AUTOMATIC_STATE_SIZE),
         reference=np.array([airspeed, 0.0]),
         level=new_level_state(),
-        pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
+        pilot=np.zeros(interpreted(pilot_state_size)(parts.tables.pilot)),
         aids=np.zeros(AID_STATE_SIZE),
         switches=switches_of(setup.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
@@ -294,19 +348,67 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         gusts=new_gust_state(setup.air, air_normals),
         faults=new_fault_state(),
         protection=np.zeros(LAW_STATE_SIZE),
+        held=held,
+        script=new_script_state(),
         clock=clock,
     )
     state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(setup.automatic_flaps), float(setup.governor)
     state.flaps[FLAP_FOLLOWS], state.flaps[FLAP_SETTING] = 1.0, NO_SETTING
     state.drive[GOVERNED] = 1.0
-    law_start(parts.tables.protection, state.protection)
+    interpreted(law_start)(parts.tables.protection, state.protection)
     if setup.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
-    kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))
-    row = np.zeros(len(COLUMN))
-    observe(parts.tables, state, parts.scratch, row)
-    kernels.engage_pilot(parts.tables, state, parts.scratch)
     return state
 
 
-__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "needed_aid_error", "start_state"]
+def prepare(
+    setup: FlightSetup,
+    parts: Parts | None = None,
+    *,
+    measure: tuple[Measure, FloatArray] | None = None,
+    unlocked: bool = False,
+) -> Flying:
+    """Put the aircraft at the start of a flight, ready for frame 0.
+
+    Args:
+        setup: The flight.
+        parts: Its parts, where the caller changed some; None: as ``build_parts`` makes them.
+        measure: A compiled part that measures each frame, and the array that it adds to.
+        unlocked: Fly outside Python's lock, for batches in threads.
+
+    Returns:
+        The flight.
+
+    Raises:
+        InputError: The start has no trim, or something that was asked for does not exist.
+    """
+    parts = build_parts(setup) if parts is None else parts
+    streams = new_streams(setup.seed)
+    flying = Flying(
+        parts.tables,
+        start_state(setup, parts, streams[1].standard_normal(3)),
+        new_scratch(parts.tables),
+        streams=streams,
+        nonlinear=parts.nonlinear,
+        noise_width=parts.noise_width,
+        measure=measure,
+        unlocked=unlocked,
+    )
+    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+    return flying
+
+
+def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
+    """Put a flight back to its start, random streams included.
+
+    Args:
+        flying: The flight; its arrays are overwritten.
+        setup: What it was set up with.
+        parts: Its parts.
+    """
+    flying.streams = new_streams(setup.seed)
+    flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
+    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+
+
+__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]

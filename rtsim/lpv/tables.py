@@ -17,6 +17,7 @@ from rtsim.aircraft.variables import (
     required_position,
 )
 from rtsim.errors import InputError
+from rtsim.kernels.packed import packed
 from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.schedule_kernels import LpvTables
@@ -95,18 +96,20 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
         ],
         axis=-1,
     )
-    return LpvTables(
-        airspeed=database.airspeed,
-        nacelle=database.nacelle,
-        alpha=_layers_last(scheduling_alpha(database, x_ref)),
-        valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
-        cells=_layers_last(cells),
-        output_cells=_layers_last(output_cells),
-        rows=rows,
-        state_columns=state_columns,
-        input_columns=input_columns,
-        alpha_speed=scheduling_speed(database),
-        roles=roles,
+    return packed(
+        LpvTables(
+            airspeed=database.airspeed,
+            nacelle=database.nacelle,
+            alpha=_layers_last(scheduling_alpha(database, x_ref)),
+            valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
+            cells=_layers_last(cells),
+            output_cells=_layers_last(output_cells),
+            rows=rows,
+            state_columns=state_columns,
+            input_columns=input_columns,
+            alpha_speed=scheduling_speed(database),
+            roles=roles,
+        )
     )
 
 

@@ -10,6 +10,7 @@ from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.faults import Fault
+from rtsim.loop.script import Pulse
 from rtsim.lpv.files.storage import load_database
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
@@ -18,7 +19,6 @@ from rtsim.units import deg, kt
 from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
 from scenarios.campaign.trial import FlightPlan, has_trim
 from scenarios.files.loader import load_scenario
-from scenarios.files.script import Pulse
 
 ATTEMPTS = 200
 """Starts drawn before a class is said to have none inside the corridor."""

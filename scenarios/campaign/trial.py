@@ -3,52 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from rtsim.aircraft.variables import STATE
 from rtsim.atmosphere import AirSpecification
-from rtsim.atmosphere.air import gust_tables, normals_needed
 from rtsim.errors import InputError
 from rtsim.faults import Fault
-from rtsim.faults.schedule import fault_tables
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
-from rtsim.loop.data import (
-    CLOCK_END,
-    CLOCK_SINK,
-    END_NONE,
-    Scratch,
-    SimulationState,
-    SimulationTables,
-)
-from rtsim.loop.setup import FlightSetup, Parts, Plant, build_parts, start_state
-from rtsim.loop.simulation import END_REASONS
+from rtsim.loop.data import SimulationTables
+from rtsim.loop.script import Pulse
+from rtsim.loop.script_kernels import S_YIELDED
+from rtsim.loop.setup import FlightSetup, Plant, build_parts, start_trim
+from rtsim.loop.simulation import Simulation
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database
 from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
 from rtsim.programme import Programme, ProgrammePoint
-from rtsim.protection import law_data
 from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import load_limits
-from rtsim.protection.tables import law_tables
-from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
-from rtsim.units import to_deg, to_kt
+from rtsim.units import to_deg
 from scenarios.campaign import trial_kernels as kernels
-from scenarios.files import script_kernels
-from scenarios.files.script import Pulse, pulse_table
 
 if TYPE_CHECKING:
     from rtsim.command import Pilot
 
 
-SLOW_CALLS = 10
-"""Calls of a law in one flight that last longer than its period and count as a failure; fewer are the machine's."""
+BUFFERED = ("reverse_margin", "pass_margin", "blend_begin", "blend_full")
+"""Margins of the built-in laws that a buffer is added to."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,8 +112,6 @@ class Bench:
         """
         self.plant, self.corridor, self.rate_hz, self.database = plant, corridor, rate_hz, database
         self._aircraft = load_database(database or None)
-        self._parts: dict[tuple[str, bool], Parts] = {}
-        self._laws: dict[tuple[str, float], law_data.ProtectionTables] = {}
         self._rows = np.zeros((0, SIGNAL_COUNT))
         limits = load_limits(self._aircraft.profile)
         self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
@@ -141,28 +125,6 @@ class Bench:
     def dt(self) -> float:
         """Length of a frame [s]."""
         return 1.0 / self.rate_hz
-
-    def law(self, name: str, *, buffer: float = 0.0) -> law_data.ProtectionTables:
-        """Give the tables of a built-in law.
-
-        Args:
-            name: One of ``rtsim.protection.tables.LAW_NAMES``.
-            buffer: Added to the margins at which governor and recovery begin to act [m/s].
-        """
-        key = (name, buffer)
-        if key not in self._laws:
-            flown = flown_database(self._aircraft, self.database or None)
-            tables = law_tables(name, flown, dt=self.dt, boundary=self.corridor)
-            settings = tables.settings
-            self._laws[key] = tables._replace(
-                settings=settings._replace(
-                    reverse_margin=settings.reverse_margin + buffer,
-                    pass_margin=settings.pass_margin + buffer,
-                    blend_begin=settings.blend_begin + buffer,
-                    blend_full=settings.blend_full + buffer,
-                )
-            )
-        return self._laws[key]
 
     def fly(
         self,
@@ -190,58 +152,42 @@ class Bench:
         Raises:
             InputError: The plan's start has no trim, or there is no such law.
         """
-        from scenarios.campaign.python_trial import fly_in_python
-
         name = law if isinstance(law, str) else compiled_law(law)
-        # Laws in Python stand in the compiled law's place.
-        tables = self.law("off" if name is None else name, buffer=buffer)
-        flying = self._prepare(plan, tables, external=pilot is not None)
-        problems: tuple[str, ...] = ()
-        if name is not None:
-            flown = self._fly_compiled(flying) if pilot is None else fly_in_python(flying, None, pilot)[0]
-        else:
+        frames = max(1, int(np.ceil(plan.duration * self.rate_hz - 1e-6)))
+        setup = self._setup(plan, "monitor" if name is None else name, external=pilot is not None)
+        parts = build_parts(setup)
+        if buffer:
+            parts = dataclasses.replace(parts, tables=_with_buffer(parts.tables, buffer))
+        chain = None
+        if name is None:
             assert not isinstance(law, str)  # a name is a compiled law
             chain = LawChain(law, dt=self.dt, remember=repeat, profile=self._aircraft.profile)
-            flown, slow = fly_in_python(flying, chain, pilot)
-            if repeat:
-                chain.unrepeatable()
-            problems = tuple(event.text for event in chain.events)
-            if slow >= SLOW_CALLS:
-                names = ", ".join(spec.name for spec in law)
-                period = 1000.0 * chain.period
-                late = f"took longer than its period of {period:.0f} ms in {slow} calls; in real time it would be late"
-                problems += (f"the law {names} {late}",)
+        simulation = Simulation(setup, parts=parts, laws=chain)
+        if len(self._rows) < frames:
+            self._rows = np.empty((frames, SIGNAL_COUNT))
+        if pilot is None:
+            rows = simulation.run(frames, self._rows)
+        else:
+            rows = _fly_by_hand(simulation, pilot, self._rows[:frames])
+        if chain is not None and repeat:
+            chain.unrepeatable()
+        problems = () if chain is None else tuple(event.text for event in chain.events)
         metrics = np.zeros(kernels.METRIC_COUNT)
-        rows = flying.rows[:flown]
-        kernels.measure_trial(rows, flying.tables.programme, self._limits, self.dt, metrics)
-        ended = int(flying.state.clock[CLOCK_END])
-        metrics[kernels.M_COMPLETED] = float(ended == END_NONE)
-        metrics[kernels.M_YIELDED] = flying.script_state[script_kernels.S_YIELDED]
-        reason = END_REASONS[ended].format(sink=float(flying.state.clock[CLOCK_SINK]))
-        return TrialFlight(TrialMetrics(metrics), reason, rows.copy() if keep else rows, problems)
+        kernels.measure_trial(rows, simulation.tables.programme, self._limits, self.dt, metrics)
+        metrics[kernels.M_COMPLETED] = float(not simulation.finished)
+        metrics[kernels.M_YIELDED] = simulation.flying.state.script[S_YIELDED]
+        return TrialFlight(TrialMetrics(metrics), simulation.end_reason, rows.copy() if keep else rows, problems)
 
-    def _fly_compiled(self, flying: Flying) -> int:
-        return int(
-            kernels.fly_trial(
-                flying.tables,
-                flying.state,
-                flying.scratch,
-                (flying.pulses, flying.script_state),
-                flying.reaction,
-                flying.noise,
-                flying.rows,
-            )
-        )
-
-    def _prepare(self, plan: FlightPlan, law: law_data.ProtectionTables, *, external: bool) -> Flying:
-        """Put the aircraft at the plan's start and draw its random numbers."""
-        frames = max(1, int(np.ceil(plan.duration * self.rate_hz - 1e-6)))
-        setup = FlightSetup(
+    def _setup(self, plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
+        """What the simulation needs to know of a plan."""
+        return FlightSetup(
             programme=plan.programme,
             plant=self.plant,
             outer_loop=plan.outer_loop,
             pilot="external" if external else "mocm",
             corridor=self.corridor,
+            protection=law,
+            protection_boundary=self.corridor,
             rate_hz=self.rate_hz,
             start_airspeed=plan.start.airspeed,
             start_nacelle=plan.start.nacelle_angle,
@@ -253,100 +199,27 @@ class Bench:
             governor=plan.governor,
             air=plan.air,
             faults=plan.faults,
+            pulses=plan.pulses,
+            reaction=plan.reaction,
             database=self.database,
         )
-        parts = self._parts_of(setup, law)
-        pilot_random = stream_generator(plan.seed, STREAM_PILOT)
-        air_random = stream_generator(plan.seed, STREAM_TURBULENCE)
-        state = start_state(setup, parts, air_random.standard_normal(3))
-        script_state = np.zeros(script_kernels.SCRIPT_STATE_SIZE)
-        script_kernels.script_start(script_state)
-        if len(self._rows) < frames:
-            self._rows = np.zeros((frames, SIGNAL_COUNT))
-        return Flying(
-            tables=parts.tables,
-            state=state,
-            scratch=parts.scratch,
-            pulses=pulse_table(plan.pulses),
-            script_state=script_state,
-            reaction=-1.0 if plan.reaction is None else plan.reaction,
-            noise=(
-                pilot_random.standard_normal((frames, parts.noise_width)),
-                air_random.standard_normal((frames, normals_needed(state.gusts))),
-            ),
-            rows=self._rows[:frames],
-            programme=plan.programme,
-        )
-
-    def _parts_of(self, setup: FlightSetup, law: law_data.ProtectionTables) -> Parts:
-        """Tables of a flight: the costly ones are loaded once and shared, the start is trimmed anew."""
-        key = (setup.outer_loop, setup.pilot_noise)
-        if key not in self._parts:
-            self._parts[key] = build_parts(setup)
-        parts = self._parts[key]
-        assert setup.start_airspeed is not None  # a plan has a start
-        assert setup.start_nacelle is not None
-        x, u = _trim(setup.plant, setup.start_airspeed, setup.start_nacelle, self.database)
-        x = x.copy()
-        x[STATE.altitude] = setup.start_altitude
-        programme = setup.programme
-        points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
-        tables = parts.tables._replace(
-            wind=float(setup.wind),
-            gusts=gust_tables(setup.air, self._aircraft.profile),
-            faults=fault_tables(setup.faults, self._aircraft.profile),
-            protection=law,
-            programme=points,
-        )
-        return dataclasses.replace(parts, tables=tables, start_x=x, start_u=u)
 
 
-@dataclass(frozen=True, slots=True)
-class Flying:
-    """Everything of one flight that is about to be flown."""
-
-    tables: SimulationTables
-    """The simulation."""
-    state: SimulationState
-    """Its state at the start."""
-    scratch: Scratch
-    """Its work space."""
-    pulses: FloatArray
-    """The script."""
-    script_state: FloatArray
-    """State of the script."""
-    reaction: float
-    """Reaction time of a pilot who yields [s]; negative for one who does not."""
-    noise: tuple[FloatArray, FloatArray]
-    """Standard normals of pilot and air."""
-    rows: FloatArray
-    """To be written: frame rows."""
-    programme: Programme
-    """What the pilot is asked to do."""
+def _with_buffer(tables: SimulationTables, buffer: float) -> SimulationTables:
+    """The same flight with a law that begins to act earlier."""
+    law = tables.protection
+    earlier = {name: getattr(law.settings, name) + buffer for name in BUFFERED}
+    return tables._replace(protection=law._replace(settings=law.settings._replace(**earlier)))
 
 
-@functools.lru_cache(maxsize=8)
-def _trim(plant: Plant, airspeed: float, nacelle: float, database: str) -> tuple[FloatArray, FloatArray]:
-    """Trimmed state and inputs at a start, altitude 0; kept, since a twin starts like its flight."""
-    from rtsim.aircraft import Condition
-    from rtsim.aircraft.xv15.model import Xv15
-    from rtsim.lpv.aircraft import LpvAircraft
-
-    if plant == "nonlinear":
-        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
-        converged, x, u = trim.converged, trim.x, trim.u
-    else:
-        aircraft = LpvAircraft(flown_database(load_database(database or None), database or None))
-        point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
-        converged, x, u = point.converged, point.x, point.u
-    if not converged:
-        raise InputError(
-            "the aircraft has no level-flight trim there",
-            key="start",
-            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
-            mend="start inside the conversion corridor (rtsim corridor shows it)",
-        )
-    return x.copy(), u.copy()
+def _fly_by_hand(simulation: Simulation, pilot: Pilot, rows: FloatArray) -> FloatArray:
+    """Fly with a pilot written in Python."""
+    flown = 0
+    while flown < len(rows) and not simulation.finished:
+        command = pilot.step(simulation.sensors(), simulation.reference(), simulation.dt)
+        rows[flown] = simulation.step(command, scripted=True)
+        flown += 1
+    return rows[:flown]
 
 
 def has_trim(plant: Plant, airspeed: float, nacelle: float, *, database: str = "") -> bool:
@@ -358,8 +231,9 @@ def has_trim(plant: Plant, airspeed: float, nacelle: float, *, database: str = "
         nacelle: Nacelle angle [rad].
         database: LPV database of the aircraft, a file; empty: the shipped XV-15.
     """
+    aircraft = flown_database(load_database(database or None), database or None)
     try:
-        _trim(plant, airspeed, nacelle, database)
+        start_trim(plant == "nonlinear", aircraft, airspeed, nacelle)
     except InputError:
         return False
     return True

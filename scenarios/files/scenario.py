@@ -7,10 +7,10 @@ from typing import Literal
 
 from rtsim.atmosphere import AirSpecification
 from rtsim.faults import Fault
+from rtsim.loop.script import Pulse
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
 from scenarios.files.nacelle_laws import AutomaticSettings
-from scenarios.files.script import Pulse
 from scenarios.files.trial import Trial
 
 PlantName = Literal["lpv", "lpv-plain", "nonlinear"]

@@ -55,6 +55,7 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         governor=scenario.governor,
         air=scenario.air,
         faults=scenario.faults,
+        pulses=scenario.pulses,
         automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),
         protection=scenario.protection,
         protection_boundary=scenario.corridor_name,
