@@ -15,6 +15,7 @@ from rtsim.frame import QUANTITY, FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, TARGET, Flight
+from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.systems.drive_kernels import DEVIATION, engine_power
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
@@ -103,7 +104,7 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.climb_rate] = climb
     si[QUANTITY.distance] = state.clock[CLOCK.distance]
     si[QUANTITY.flight_path] = math.atan2(climb, max(abs(through), 1.0))
-    si[QUANTITY.angle_of_attack] = math.atan2(x[STATE.w] + gusts[G_W] + 4.5 * st, x[STATE.u] + gusts[G_U] + 4.5 * ct)
+    si[QUANTITY.angle_of_attack] = scheduling_alpha(x[STATE.u] + gusts[G_U], x[STATE.w] + gusts[G_W], st, ct)
     si[QUANTITY.pitch_rate] = x[STATE.q]
     si[QUANTITY.body_u] = x[STATE.u]
     si[QUANTITY.body_w] = x[STATE.w]
