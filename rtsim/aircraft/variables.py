@@ -5,12 +5,11 @@ Whoever needs a group of them selects by role, never by "all but" and never by w
 
 from __future__ import annotations
 
-from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from rtsim.errors import InputError
+from rtsim.places import Places
 
 ROLES: dict[str, dict[str, str]] = {
     "state": {
@@ -189,12 +188,9 @@ in the deflection. Together they are the flap deflection less that of the schedu
 AUXILIARY_INPUTS = _names(INPUTS, "flap", "drive")
 """Inputs that are zero while flaps and rotor speed are where schedule and governor have them."""
 
-_States = namedtuple("_States", [v.name for v in STATES])  # type: ignore[misc]
-_Inputs = namedtuple("_Inputs", [v.name for v in INPUTS])  # type: ignore[misc]
-_Outputs = namedtuple("_Outputs", [v.name for v in OUTPUTS])  # type: ignore[misc]
-STATE: Any = _States(*range(len(STATES)))
+STATE = Places(*(variable.name for variable in STATES))
 """Index of a state by name, usable in compiled kernels."""
-INPUT: Any = _Inputs(*range(len(INPUTS)))
+INPUT = Places(*(variable.name for variable in INPUTS))
 """Index of an input by name."""
-OUTPUT: Any = _Outputs(*range(len(OUTPUTS)))
+OUTPUT = Places(*(variable.name for variable in OUTPUTS))
 """Index of an output by name."""

@@ -17,11 +17,12 @@ from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
+from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
 from rtsim.loop import frame_kernels as frames_of
@@ -47,7 +48,7 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
-from rtsim.lpv.tables import Form, prepare_tables
+from rtsim.lpv.tables import Form, prepare_tables, scheduling_speed
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
@@ -57,7 +58,7 @@ from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme
 from rtsim.protection.boundary import BoundaryName, load_boundary
 from rtsim.protection.chain import compiled_law
-from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE, ProtectionTables
+from rtsim.protection.law_data import LAW_STATE_SIZE, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
@@ -228,6 +229,7 @@ def build_parts(setup: FlightSetup) -> Parts:
             aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[setup.plant])),
             configuration=own.configuration,
             controls=control_tables(profile),
+            alpha_speed=scheduling_speed(database),
         ),
         nacelle=load_nacelle_tables(profile),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
@@ -244,6 +246,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         ),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
+        units=UNIT_SCALES,
         reference_frequency=REFERENCE_FREQUENCY,
     )
     return Parts(
@@ -285,8 +288,9 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
         planned=np.zeros(3),
         gust=np.zeros(3),
-        sensors=np.zeros(SENSOR_COUNT),
+        sensors=np.zeros(SENSOR.size),
         law=np.zeros(WORK_SIZE),
+        si=np.zeros(SIGNAL_COUNT),
         row=np.zeros(SIGNAL_COUNT),
     )
 
@@ -394,7 +398,8 @@ def prepare(
         measure=measure,
         unlocked=unlocked,
     )
-    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+    flying.do(frames_of.DISTURB)
+    flying.engage()
     return flying
 
 
@@ -408,7 +413,8 @@ def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
     """
     flying.streams = new_streams(setup.seed)
     flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
-    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+    flying.do(frames_of.DISTURB)
+    flying.engage()
 
 
 __all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]

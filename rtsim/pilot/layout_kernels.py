@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections import namedtuple
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.variables import RIGID_BODY_STATES
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.places import Places
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -69,11 +69,11 @@ N_Z_H = 9
 N_DT = 10
 N_COUNT = 11
 
-PLANT: Any = namedtuple("_Plant", RIGID_BODY_STATES)(*range(len(RIGID_BODY_STATES)))
+PLANT = Places(*RIGID_BODY_STATES)
 """Places of the rigid body among the design plant's states."""
 DISPLAYS = ("airspeed", "altitude", "climb_rate", "pitch", "pitch_rate")
 """What the pilot sees; with integrators also ``airspeed_integral`` and ``altitude_integral``."""
-DISPLAY: Any = namedtuple("_Display", DISPLAYS)(*range(len(DISPLAYS)))
+DISPLAY = Places(*DISPLAYS)
 """Places of the displays."""
 
 SAME_CONTROL = 1e-9
