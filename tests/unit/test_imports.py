@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # A part may import from its own layer's parts only itself, and from every part of a lower layer.
 LAYERS = (
-    ("rtsim.units",),
+    ("rtsim.units", "rtsim.places"),
     ("rtsim.errors",),
     ("rtsim.frame",),
     ("rtsim.command",),
