@@ -147,6 +147,7 @@ class MavlinkConfig:
         values: dict[str, Any] = json.loads(text)
         values["targets"] = tuple(Endpoint(**target) for target in values["targets"])
         values["home"] = HomePosition(**values["home"])
+        values["ratings"] = Ratings(**values["ratings"])
         values["whitelist"] = tuple(values["whitelist"])
         return cls(**values)
 
