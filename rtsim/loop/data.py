@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from rtsim.aids.aids_kernels import AidTables
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.atmosphere.gust_kernels import GustTables
+from rtsim.choices import PilotMode
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.faults.fault_kernels import FaultTables
 from rtsim.frame import FloatArray
@@ -20,7 +21,6 @@ from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
 
 MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
-PilotMode = Literal["mocm", "external", "hold"]
 MODES: dict[PilotMode, int] = {
     "mocm": MODE_MOCM,
     "external": MODE_EXTERNAL,

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
-from rtsim.aids import AidName, SwitchName, design_aids, switches_of
+from rtsim.aids import design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
+from rtsim.choices import PlantName, SwitchName
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
@@ -31,6 +33,7 @@ from rtsim.loop.data import (
     SimulationTables,
 )
 from rtsim.loop.observe_kernels import observe
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.plant_kernels import AircraftFrame
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
@@ -45,8 +48,8 @@ from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
-from rtsim.programme import Programme
-from rtsim.protection.boundary import BoundaryName, load_boundary
+from rtsim.programme import Programme, ProgrammePoint
+from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
 from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE
 from rtsim.protection.law_kernels import law_start
@@ -57,8 +60,7 @@ from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
 from rtsim.units import to_deg, to_kt
 
-Plant = Literal["lpv", "lpv-plain", "nonlinear"]
-PLANT_FORMS: dict[Plant, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
+PLANT_FORMS: dict[PlantName, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
 REFERENCE_FREQUENCY = 1.5
 """Natural frequency of the airspeed reference filter [rad/s]."""
 
@@ -69,47 +71,24 @@ class FlightSetup:
 
     programme: Programme
     """Airspeed, nacelle angle and altitude over time."""
-    plant: Plant = "lpv"
-    """``lpv`` (three scheduling variables), ``lpv-plain`` (the paper's form) or ``nonlinear``."""
-    outer_loop: Literal["integrators", "pi"] = "integrators"
-    """How the MOCM holds airspeed and altitude."""
-    pilot: Literal["mocm", "external"] = "mocm"
-    """Who flies at frame 0."""
-    corridor: BoundaryName = "design"
-    """Boundaries to watch."""
-    rate_hz: int = 250
-    """Frames per second."""
-    start_airspeed: float | None = None
-    """Airspeed at frame 0 [m/s]; None: the programme's first."""
-    start_nacelle: float | None = None
-    """Nacelle angle at frame 0 [rad]; None: the programme's first."""
-    start_altitude: float | None = None
-    """Altitude at frame 0 [m]; None: the programme's first."""
-    wind: float = 0.0
-    """Steady tailwind [m/s]."""
-    seed: int = 0
-    """Root of every random stream."""
-    pilot_noise: bool = False
-    """Let the MOCM's observation and motor noise act."""
-    aids: tuple[AidName, ...] = ()
-    """Pilot aids on at frame 0; they act on hands and plug-ins, not on the MOCM and not on held controls."""
-    automatic_flaps: bool = True
-    """Whether the flaps follow their schedule at frame 0, whoever flies; else they stay where they are."""
-    governor: bool = True
-    """Whether the governor holds the rotor speed at frame 0, whoever flies."""
+    options: FlightOptions = FlightOptions(protection="off")
+    """Who flies what; by default nothing watches or protects."""
+    start: ProgrammePoint | None = None
+    """Trimmed condition at frame 0; None: the programme's first point."""
     air: AirSpecification = CALM
     """Gusts and turbulence."""
     faults: tuple[Fault, ...] = ()
     """Failures and their times."""
     automatic_nacelle: AutomaticNacelle | None = None
     """Automatic nacelle control, which sets the nacelle rate whoever flies; None: the pilot does."""
-    protection: str = "off"
-    """Protection laws in the order in which they act, separated by commas: ``off``, ``monitor``, ``governor``,
-    ``full``, ``MODULE:CLASS`` or an entry point."""
-    protection_boundary: BoundaryName = "flight"
-    """Corridor that the built-in laws keep to."""
-    database: str = ""
-    """LPV database that is flown, a file (``.nc``, ``.mat``); empty: the shipped XV-15."""
+
+    def with_options(self, **changes: Any) -> FlightSetup:
+        """The setup with other options.
+
+        Args:
+            changes: Values by field of :class:`FlightOptions`, SI.
+        """
+        return dataclasses.replace(self, options=self.options.changed(changes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,11 +112,8 @@ class Parts:
 
 
 def _start(setup: FlightSetup) -> tuple[float, float, float]:
-    first = setup.programme.at(0.0)
-    airspeed = first.airspeed if setup.start_airspeed is None else setup.start_airspeed
-    nacelle = first.nacelle_angle if setup.start_nacelle is None else setup.start_nacelle
-    altitude = first.altitude if setup.start_altitude is None else setup.start_altitude
-    return airspeed, nacelle, altitude
+    start = setup.programme.at(0.0) if setup.start is None else setup.start
+    return start.airspeed, start.nacelle_angle, start.altitude
 
 
 def build_parts(setup: FlightSetup) -> Parts:
@@ -149,12 +125,13 @@ def build_parts(setup: FlightSetup) -> Parts:
     Raises:
         InputError: The start has no trim.
     """
-    loaded = load_database(setup.database or None)
-    database = flown_database(loaded, setup.database or None)
+    options = setup.options
+    loaded = load_database(options.database or None)
+    database = flown_database(loaded, options.database or None)
     lpv_aircraft = LpvAircraft(database)
     nonlinear_aircraft = Xv15.load()
     airspeed, nacelle, altitude = _start(setup)
-    if setup.plant == "nonlinear":
+    if options.plant == "nonlinear":
         trim = nonlinear_aircraft.trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
         converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
     else:
@@ -171,14 +148,14 @@ def build_parts(setup: FlightSetup) -> Parts:
     programme = setup.programme
     own = nonlinear_aircraft.tables
     tables = SimulationTables(
-        dt=1.0 / setup.rate_hz,
-        wind=float(setup.wind),
-        lpv=prepare_tables(database, PLANT_FORMS[setup.plant]),
-        aircraft=own if setup.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
+        dt=1.0 / options.rate_hz,
+        wind=float(options.wind),
+        lpv=prepare_tables(database, PLANT_FORMS[options.plant]),
+        aircraft=own if options.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
         nacelle=load_nacelle_tables(),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
-        corridor=load_boundary(setup.corridor, database).tables(),
-        pilot=load_pilot_tables(database, setup.outer_loop, dt=1.0 / setup.rate_hz),
+        corridor=load_boundary(options.corridor_name, database).tables(),
+        pilot=load_pilot_tables(database, options.outer_loop, dt=1.0 / options.rate_hz),
         flaps=load_flap_tables(own),
         drive=load_drive_tables(own),
         aids=design_aids(database),
@@ -186,10 +163,10 @@ def build_parts(setup: FlightSetup) -> Parts:
         faults=fault_tables(setup.faults),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
         protection=law_tables(
-            compiled_law(load_laws(setup.protection)) or "monitor",
+            compiled_law(load_laws(options.protection)) or "monitor",
             database,
-            dt=1.0 / setup.rate_hz,
-            boundary=setup.protection_boundary,
+            dt=1.0 / options.rate_hz,
+            boundary=options.corridor_name,
         ),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         reference_frequency=REFERENCE_FREQUENCY,
@@ -221,7 +198,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     return Parts(
         tables=tables,
         scratch=scratch,
-        noise_width=noise_width(tables.pilot) if setup.pilot_noise else 0,
+        noise_width=noise_width(tables.pilot) if options.pilot_noise else 0,
         database_hash=loaded.content_hash,
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
@@ -231,11 +208,11 @@ def build_parts(setup: FlightSetup) -> Parts:
 
 def _needed_aids(setup: FlightSetup, database: Database) -> tuple[SwitchName, ...]:
     needed: list[SwitchName] = []
-    if setup.plant != "nonlinear" and not moves_flaps(database):
+    if setup.options.plant != "nonlinear" and not moves_flaps(database):
         needed.append("automatic_flaps")
-    if setup.plant != "nonlinear" and not turns_rotors(database):
+    if setup.options.plant != "nonlinear" and not turns_rotors(database):
         needed.append("governor")
-    for name, on in (("automatic_flaps", setup.automatic_flaps), ("governor", setup.governor)):
+    for name, on in (("automatic_flaps", setup.options.automatic_flaps), ("governor", setup.options.governor)):
         if name in needed and not on:
             raise needed_aid_error(name)
     return tuple(needed)
@@ -264,9 +241,10 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         parts: Its parts.
         air_normals: Three standard normals: the turbulence at the start.
     """
+    options = setup.options
     airspeed, nacelle, _ = _start(setup)
     clock = np.zeros(CLOCK_SIZE)
-    clock[CLOCK_MODE] = MODE_MOCM if setup.pilot == "mocm" else MODE_EXTERNAL
+    clock[CLOCK_MODE] = MODE_MOCM if options.mocm_begins else MODE_EXTERNAL
     u = parts.start_u.copy()
     u[INPUT.nacelle_rate :] = 0.0
     state = SimulationState(
@@ -278,7 +256,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         level=new_level_state(),
         pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
         aids=np.zeros(AID_STATE_SIZE),
-        switches=switches_of(setup.aids),
+        switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
         drive=np.zeros(DRIVE_STATE_SIZE),
         gusts=new_gust_state(setup.air, air_normals),
@@ -286,11 +264,11 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         protection=np.zeros(LAW_STATE_SIZE),
         clock=clock,
     )
-    state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(setup.automatic_flaps), float(setup.governor)
+    state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(options.automatic_flaps), float(options.governor)
     state.flaps[FLAP_FOLLOWS], state.flaps[FLAP_SETTING] = 1.0, NO_SETTING
     state.drive[GOVERNED] = 1.0
     law_start(parts.tables.protection, state.protection)
-    if setup.aids:
+    if options.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
     kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))
     row = np.zeros(len(COLUMN))
@@ -299,4 +277,4 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     return state
 
 
-__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "needed_aid_error", "start_state"]
+__all__ = ["FlightSetup", "Parts", "build_parts", "needed_aid_error", "start_state"]

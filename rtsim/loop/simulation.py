@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import SWITCHES, SwitchName, switch_of
+from rtsim.aids import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT, STATE
 from rtsim.atmosphere import Gust, Turbulence
 from rtsim.atmosphere.air import add_gust, normals_needed, set_turbulence
+from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
 from rtsim.faults import Fault, FaultSwitch
@@ -28,7 +29,6 @@ from rtsim.loop.data import (
     END_NONE,
     END_REASONS,
     MODES,
-    PilotMode,
     SimulationState,
 )
 from rtsim.loop.observe_kernels import observe
@@ -45,7 +45,7 @@ from rtsim.units import DEGREE, INCH_POUND, KNOT
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
 
-__all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
+__all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "Programme", "Simulation", "Snapshot"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +78,8 @@ class Simulation:
         self.setup = setup
         self._parts: Parts = build_parts(setup)
         self.tables = self._parts.tables
-        self._random = stream_generator(setup.seed, STREAM_PILOT)
-        self._air_random = stream_generator(setup.seed, STREAM_TURBULENCE)
+        self._random = stream_generator(setup.options.seed, STREAM_PILOT)
+        self._air_random = stream_generator(setup.options.seed, STREAM_TURBULENCE)
         self._state = start_state(setup, self._parts, self._air_random.standard_normal(3))
         self._scratch = self._parts.scratch
         self._noise_width = self._parts.noise_width
@@ -88,7 +88,8 @@ class Simulation:
         self._applied = np.zeros(3)
         self._observed = False
         self._noise = np.zeros(self._noise_width)
-        laws = load_laws(setup.protection, boundary=setup.protection_boundary, database=setup.database)
+        options = setup.options
+        laws = load_laws(options.protection, boundary=options.corridor_name, database=options.database)
         self.laws = LawChain(laws, dt=self.tables.dt) if compiled_law(laws) is None else None
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
 
@@ -149,8 +150,8 @@ class Simulation:
 
     def reset(self) -> None:
         """Go back to frame 0, random stream included."""
-        self._random = stream_generator(self.setup.seed, STREAM_PILOT)
-        self._air_random = stream_generator(self.setup.seed, STREAM_TURBULENCE)
+        self._random = stream_generator(self.setup.options.seed, STREAM_PILOT)
+        self._air_random = stream_generator(self.setup.options.seed, STREAM_TURBULENCE)
         fresh = start_state(self.setup, self._parts, self._air_random.standard_normal(3))
         for mine, start in zip(self._state, fresh, strict=True):
             mine[:] = start

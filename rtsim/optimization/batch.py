@@ -90,15 +90,15 @@ class BatchFlyer:
         Args:
             flight: The flight.
         """
-        seed = self.setup.seed if flight.seed is None else flight.seed
-        setup = dataclasses.replace(self.setup, programme=flight.programme, seed=seed)
+        seed = self.setup.options.seed if flight.seed is None else flight.seed
+        setup = dataclasses.replace(self.setup.with_options(seed=seed), programme=flight.programme)
         parts = self._own_parts(flight.programme)
         pilot_random = stream_generator(seed, STREAM_PILOT)
         air_random = stream_generator(seed, STREAM_TURBULENCE)
         state = start_state(setup, parts, air_random.standard_normal(3))
         dt = parts.tables.dt
         duration = flight.programme.duration if flight.duration is None else flight.duration
-        frames = max(1, math.ceil(duration * self.setup.rate_hz - 1e-6))
+        frames = max(1, math.ceil(duration * self.setup.options.rate_hz - 1e-6))
         row, merit = np.zeros(SIGNAL_COUNT), np.zeros(kernels.MERIT_SIZE)
         flown = 0
         while flown < frames and state.clock[CLOCK_END] == END_NONE:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rtsim.aircraft.variables import STATE
-from rtsim.atmosphere import AirSpecification
 from rtsim.atmosphere.air import gust_tables, normals_needed
+from rtsim.choices import BUILT_IN_PILOT, CorridorName, PlantName
 from rtsim.errors import InputError
-from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from rtsim.loop.data import (
@@ -25,12 +24,12 @@ from rtsim.loop.data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.loop.setup import FlightSetup, Parts, Plant, build_parts, start_state
+from rtsim.loop.setup import FlightSetup, Parts, build_parts, start_state
 from rtsim.loop.simulation import END_REASONS
 from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
-from rtsim.programme import Programme, ProgrammePoint
+from rtsim.nacelle.automatic import inactive_tables
+from rtsim.programme import Programme
 from rtsim.protection import law_data
-from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import load_limits
@@ -51,34 +50,16 @@ SLOW_CALLS = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightPlan:
-    """One flight as it is meant to go, without a law. SI and radians."""
+    """One flight as it is meant to go, and what its script does. SI and radians."""
 
-    programme: Programme
-    """What the pilot is asked to do."""
-    start: ProgrammePoint
-    """Trimmed condition at frame 0."""
+    setup: FlightSetup
+    """What flies, how and from where; model, corridor, rate, pilot and law are those of the bench."""
     duration: float
     """Length of the flight [s]."""
     pulses: tuple[Pulse, ...] = ()
     """What the script does to the controls."""
     reaction: float | None = None
     """A pilot who yields: how long a warning lasts before he gives up his plan [s]; None: he never does."""
-    air: AirSpecification = field(default_factory=AirSpecification)
-    """Gusts and turbulence."""
-    faults: tuple[Fault, ...] = ()
-    """Failures."""
-    wind: float = 0.0
-    """Steady tailwind [m/s]."""
-    pilot_noise: bool = False
-    """Noise of the built-in pilot."""
-    outer_loop: Literal["integrators", "pi"] = "integrators"
-    """How the built-in pilot holds airspeed and altitude."""
-    automatic_flaps: bool = True
-    """Whether the flaps follow their schedule."""
-    governor: bool = True
-    """Whether the governor holds the rotor speed."""
-    seed: int = 0
-    """Root of the flight's random streams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +87,8 @@ class Bench:
     def __init__(
         self,
         *,
-        plant: Plant = "lpv",
-        corridor: BoundaryName = "flight",
+        plant: PlantName = "lpv",
+        corridor: CorridorName = "flight",
         rate_hz: int = 250,
     ) -> None:
         """Remember what to fly; parts are loaded with the first flight.
@@ -118,8 +99,8 @@ class Bench:
             rate_hz: Frames per second.
         """
         self.plant, self.corridor, self.rate_hz = plant, corridor, rate_hz
-        self._parts: dict[tuple[str, bool], Parts] = {}
-        self._laws: dict[tuple[str, float], law_data.ProtectionTables] = {}
+        self._parts: dict[tuple[str, bool, str], Parts] = {}
+        self._laws: dict[tuple[str, float, str], law_data.ProtectionTables] = {}
         self._rows = np.zeros((0, SIGNAL_COUNT))
         limits = load_limits()
         self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
@@ -129,18 +110,21 @@ class Bench:
         """Length of a frame [s]."""
         return 1.0 / self.rate_hz
 
-    def law(self, name: str, *, buffer: float = 0.0) -> law_data.ProtectionTables:
+    def law(self, name: str, *, buffer: float = 0.0, database: str = "") -> law_data.ProtectionTables:
         """Give the tables of a built-in law.
 
         Args:
             name: One of ``rtsim.protection.tables.LAW_NAMES``.
             buffer: Added to the margins at which governor and recovery begin to act [m/s].
+            database: LPV database it predicts with, a file; empty: the shipped XV-15.
         """
-        key = (name, buffer)
+        key = (name, buffer, database)
         if key not in self._laws:
             from rtsim.lpv.files.storage import load_database
+            from rtsim.lpv.flown import flown_database
 
-            tables = law_tables(name, load_database(), dt=self.dt, boundary=self.corridor)
+            flown = flown_database(load_database(database or None), database or None)
+            tables = law_tables(name, flown, dt=self.dt, boundary=self.corridor)
             settings = tables.settings
             self._laws[key] = tables._replace(
                 settings=settings._replace(
@@ -182,7 +166,7 @@ class Bench:
 
         name = law if isinstance(law, str) else compiled_law(law)
         # Laws in Python stand in the compiled law's place.
-        tables = self.law("off" if name is None else name, buffer=buffer)
+        tables = self.law("off" if name is None else name, buffer=buffer, database=plan.setup.options.database)
         flying = self._prepare(plan, tables, external=pilot is not None)
         problems: tuple[str, ...] = ()
         if name is not None:
@@ -224,27 +208,16 @@ class Bench:
     def _prepare(self, plan: FlightPlan, law: law_data.ProtectionTables, *, external: bool) -> Flying:
         """Put the aircraft at the plan's start and draw its random numbers."""
         frames = max(1, int(np.ceil(plan.duration * self.rate_hz - 1e-6)))
-        setup = FlightSetup(
-            programme=plan.programme,
+        setup = plan.setup.with_options(
             plant=self.plant,
-            outer_loop=plan.outer_loop,
-            pilot="external" if external else "mocm",
+            pilot="external" if external else BUILT_IN_PILOT,
             corridor=self.corridor,
+            protection="off",
             rate_hz=self.rate_hz,
-            start_airspeed=plan.start.airspeed,
-            start_nacelle=plan.start.nacelle_angle,
-            start_altitude=plan.start.altitude,
-            wind=plan.wind,
-            seed=plan.seed,
-            pilot_noise=plan.pilot_noise,
-            automatic_flaps=plan.automatic_flaps,
-            governor=plan.governor,
-            air=plan.air,
-            faults=plan.faults,
         )
         parts = self._parts_of(setup, law)
-        pilot_random = stream_generator(plan.seed, STREAM_PILOT)
-        air_random = stream_generator(plan.seed, STREAM_TURBULENCE)
+        pilot_random = stream_generator(setup.options.seed, STREAM_PILOT)
+        air_random = stream_generator(setup.options.seed, STREAM_TURBULENCE)
         state = start_state(setup, parts, air_random.standard_normal(3))
         script_state = np.zeros(script_kernels.SCRIPT_STATE_SIZE)
         script_kernels.script_start(script_state)
@@ -262,24 +235,25 @@ class Bench:
                 air_random.standard_normal((frames, normals_needed(state.gusts))),
             ),
             rows=self._rows[:frames],
-            programme=plan.programme,
+            programme=setup.programme,
         )
 
     def _parts_of(self, setup: FlightSetup, law: law_data.ProtectionTables) -> Parts:
         """Tables of a flight: the costly ones are loaded once and shared, the start is trimmed anew."""
-        key = (setup.outer_loop, setup.pilot_noise)
+        options = setup.options
+        key = (options.outer_loop, options.pilot_noise, options.database)
         if key not in self._parts:
             self._parts[key] = build_parts(setup)
         parts = self._parts[key]
-        assert setup.start_airspeed is not None  # a plan has a start
-        assert setup.start_nacelle is not None
-        x, u = _trim(setup.plant, setup.start_airspeed, setup.start_nacelle)
-        x = x.copy()
-        x[STATE.altitude] = setup.start_altitude
         programme = setup.programme
+        start = programme.at(0.0) if setup.start is None else setup.start
+        x, u = _trim(options.plant, start.airspeed, start.nacelle_angle, options.database)
+        x = x.copy()
+        x[STATE.altitude] = start.altitude
         points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
         tables = parts.tables._replace(
-            wind=float(setup.wind),
+            wind=float(options.wind),
+            automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
             gusts=gust_tables(setup.air),
             faults=fault_tables(setup.faults),
             protection=law,
@@ -313,7 +287,7 @@ class Flying:
 
 
 @functools.lru_cache(maxsize=8)
-def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
+def _trim(plant: PlantName, airspeed: float, nacelle: float, database: str = "") -> tuple[FloatArray, FloatArray]:
     """Trimmed state and inputs at a start, altitude 0; kept, since a twin starts like its flight."""
     from rtsim.aircraft import Condition
     from rtsim.aircraft.xv15.model import Xv15
@@ -323,7 +297,7 @@ def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, Fl
         trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
         converged, x, u = trim.converged, trim.x, trim.u
     else:
-        point = load_aircraft().trim(airspeed=airspeed, nacelle=nacelle)
+        point = load_aircraft(database or None).trim(airspeed=airspeed, nacelle=nacelle)
         converged, x, u = point.converged, point.x, point.u
     if not converged:
         raise InputError(
@@ -335,7 +309,7 @@ def _trim(plant: Plant, airspeed: float, nacelle: float) -> tuple[FloatArray, Fl
     return x.copy(), u.copy()
 
 
-def has_trim(plant: Plant, airspeed: float, nacelle: float) -> bool:
+def has_trim(plant: PlantName, airspeed: float, nacelle: float) -> bool:
     """Whether a flight can start somewhere.
 
     Args:

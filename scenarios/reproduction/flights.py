@@ -10,15 +10,16 @@ import numpy as np
 
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.atmosphere.air import normals_needed
+from rtsim.choices import OuterLoop, PlantName
 from rtsim.frame import SIGNAL_COUNT, SIGNAL_NAMES, FloatArray
 from rtsim.loop.advance_kernels import run_frames
 from rtsim.loop.data import CLOCK_END, CLOCK_SINK
-from rtsim.loop.setup import FlightSetup, Plant, build_parts, start_state
+from rtsim.loop.options import FlightOptions
+from rtsim.loop.setup import FlightSetup, build_parts, start_state
 from rtsim.loop.simulation import END_REASONS
 from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
 from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
 from rtsim.pilot.layout_kernels import PilotTables
-from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.weights import PilotSettings
 from rtsim.programme import Programme
 from rtsim.random_streams import STREAM_TURBULENCE, stream_generator
@@ -35,7 +36,7 @@ class Variant:
     """Short name."""
     title: str
     """For people."""
-    plant: Plant = "lpv"
+    plant: PlantName = "lpv"
     """Aircraft model."""
     outer_loop: OuterLoop = "integrators"
     """How the pilot holds airspeed and altitude."""
@@ -135,11 +136,14 @@ class Flyer:
             air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=variant.turbulence))
         setup = FlightSetup(
             programme=programme,
-            plant=variant.plant,
-            outer_loop=variant.outer_loop,
-            rate_hz=RATE_HZ,
+            options=FlightOptions(
+                plant=variant.plant,
+                outer_loop=variant.outer_loop,
+                protection="off",
+                rate_hz=RATE_HZ,
+                seed=variant.seed,
+            ),
             air=air,
-            seed=variant.seed,
         )
         parts = build_parts(setup)
         if self._pilot is not None:

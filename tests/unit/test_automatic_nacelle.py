@@ -177,7 +177,7 @@ def test_scenarios_choose_the_law():
     assert parsed('"programme"').nacelle == "programme"
     assert parsed('"my_laws:Mine"').nacelle == "my_laws:Mine"
     scenario = parsed('"automatic"', '[automatic]\nschedule = "programme"\nrate_deg_s = 12\ndetents = true')
-    law = automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme)
+    law = automatic_nacelle(scenario.options.nacelle, scenario.automatic, scenario.programme)
     assert law is not None
     assert law.rate == deg(12.0)
     assert law.detents
