@@ -58,8 +58,7 @@ def run_campaign_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Folder that keeps finished flights, so that the same command goes on there, report.json and "
-            "flights.csv.",
+            help="Folder for finished flights (the same command goes on there), report.json and flights.csv.",
             show_default="none",
         ),
     ] = None,

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from rtsim.optimization.search import Evaluator, Progress, SearchResult
     from rtsim.optimization.spec import SearchSpec
 
+_OWN = "the specification's"
+
 
 def register(app: typer.Typer) -> None:
     """Add the command to the app.
@@ -29,28 +31,46 @@ def register(app: typer.Typer) -> None:
     app.command("optimize")(optimize_command)
 
 
-@takes_options("database", own="the specification's")
+@takes_options("database", own=_OWN)
 def optimize_command(
-    spec: Annotated[Path | None, typer.Argument(help="Specification (TOML); without one, the paper's search.")] = None,
+    spec: Annotated[
+        Path | None, typer.Argument(help="Specification (TOML).", show_default="the paper's search")
+    ] = None,
     *,
     objective: Annotated[
-        list[str] | None, typer.Option(help="What to minimize; repeat for a Pareto front (with --method nsga2).")
+        list[str] | None,
+        typer.Option(
+            help="What to minimize; repeat for a Pareto front (with --method nsga2).",
+            show_default=_OWN,
+        ),
     ] = None,
     like: Annotated[
-        str | None, typer.Option(help="Constraint set of a path of the paper: typical, near_stall, centre_line, ...")
+        str | None,
+        typer.Option(
+            help="Constraint set of a path of the paper: typical, near_stall, centre_line, ...", show_default="none"
+        ),
     ] = None,
-    generations: Annotated[int | None, typer.Option(help="Generations to search.")] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates per generation.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Root of the search's random stream.")] = None,
-    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.")] = None,
-    handling: Annotated[str | None, typer.Option(help="Constraints by feasibility or by penalty.")] = None,
-    points: Annotated[int | None, typer.Option(help="Free points of the path.")] = None,
-    nacelle_rate_deg_s: Annotated[float | None, typer.Option(help="Nacelle rate [deg/s].")] = None,
-    robust: Annotated[int | None, typer.Option(help="Flights in turbulence that judge each path; 0: calm air.")] = None,
+    generations: Annotated[int | None, typer.Option(help="Generations to search.", show_default=_OWN)] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default=_OWN)] = None,
+    seed: Annotated[int | None, typer.Option(help="Root of the search's random stream.", show_default=_OWN)] = None,
+    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.", show_default=_OWN)] = None,
+    handling: Annotated[
+        str | None, typer.Option(help="Constraints by feasibility or by penalty.", show_default=_OWN)
+    ] = None,
+    points: Annotated[int | None, typer.Option(help="Free points of the path.", show_default=_OWN)] = None,
+    nacelle_rate_deg_s: Annotated[float | None, typer.Option(help="Nacelle rate [deg/s].", show_default=_OWN)] = None,
+    robust: Annotated[
+        int | None,
+        typer.Option(help="Flights in turbulence that judge each path; 0: calm air.", show_default=_OWN),
+    ] = None,
     options: dict[str, Any],
-    jobs: Annotated[int | None, typer.Option(help="Threads that fly; default one per core.", min=1, max=256)] = None,
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to fly on.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Scenario file to write; default NAME.toml here.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="Threads that fly.", show_default="one per core", min=1, max=256)
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler to fly on.", show_default="this machine")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Scenario file to write.", show_default="NAME.toml here")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the record beside the scenario file.")] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave the nonlinear check flight out.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,

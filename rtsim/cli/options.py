@@ -53,7 +53,9 @@ def takes_options(*names: str, own: str = "the scenario's") -> Callable[[Command
 def _panel(parameter: inspect.Parameter) -> int:
     """Place of an option's panel in ``--help``."""
     panel = parameter.annotation.__metadata__[0].rich_help_panel
-    return PANELS.index(panel) if panel else -1
+    if panel is None:
+        return -1
+    return PANELS.index(panel) if panel in PANELS else len(PANELS)
 
 
 def _parameter(item: Option, own: str, panel: str | None) -> inspect.Parameter:
@@ -61,7 +63,7 @@ def _parameter(item: Option, own: str, panel: str | None) -> inspect.Parameter:
     flags = (item.flag, f"--no-{item.flag.removeprefix('--')}") if item.kind is bool else (item.flag,)
     described = typer.Option(
         "/".join(flags),
-        help=f"{item.help[:-1]} [{item.unit}]." if item.unit else item.help,
+        help=f"{item.help.removesuffix('.')} [{item.unit}]." if item.unit else item.help,
         show_default=f"{own}, {item.default_text}",
         rich_help_panel=panel,
         metavar="A,B" if item.is_list else None,

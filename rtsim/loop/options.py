@@ -98,7 +98,7 @@ class Option:
             return ", ".join(self.choices)
         if self.low is not None and self.high is not None:
             return f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
-        return self.values or "on, off"
+        return self.values or {bool: "on, off", str: "a text"}.get(self.kind, "a number")
 
     def shown(self, value: Any) -> Any:
         """A value of the option in its unit.

@@ -24,6 +24,7 @@ from rtsim.loop.data import (
     SimulationState,
     SimulationTables,
 )
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, start_state
 from rtsim.loop.simulation import END_REASONS
 from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     from rtsim.command import Pilot
 
 
+MOST_PARTS = 8
+"""Sets of options whose tables a bench keeps."""
 SLOW_CALLS = 10
 """Calls of a law in one flight that last longer than its period and count as a failure; fewer are the machine's."""
 
@@ -99,7 +102,7 @@ class Bench:
             rate_hz: Frames per second.
         """
         self.plant, self.corridor, self.rate_hz = plant, corridor, rate_hz
-        self._parts: dict[tuple[str, bool, str], Parts] = {}
+        self._parts: dict[FlightOptions, Parts] = {}
         self._laws: dict[tuple[str, float, str], law_data.ProtectionTables] = {}
         self._rows = np.zeros((0, SIGNAL_COUNT))
         limits = load_limits()
@@ -241,7 +244,9 @@ class Bench:
     def _parts_of(self, setup: FlightSetup, law: law_data.ProtectionTables) -> Parts:
         """Tables of a flight: the costly ones are loaded once and shared, the start is trimmed anew."""
         options = setup.options
-        key = (options.outer_loop, options.pilot_noise, options.database)
+        key = dataclasses.replace(options, seed=0, wind=0.0)  # these two are each flight's own
+        if key not in self._parts and len(self._parts) >= MOST_PARTS:
+            self._parts.clear()
         if key not in self._parts:
             self._parts[key] = build_parts(setup)
         parts = self._parts[key]

@@ -174,8 +174,8 @@ def parsed(nacelle, table=""):
 
 
 def test_scenarios_choose_the_law():
-    assert parsed('"programme"').nacelle == "programme"
-    assert parsed('"my_laws:Mine"').nacelle == "my_laws:Mine"
+    assert parsed('"programme"').options.nacelle == "programme"
+    assert parsed('"my_laws:Mine"').options.nacelle == "my_laws:Mine"
     scenario = parsed('"automatic"', '[automatic]\nschedule = "programme"\nrate_deg_s = 12\ndetents = true')
     law = automatic_nacelle(scenario.options.nacelle, scenario.automatic, scenario.programme)
     assert law is not None
@@ -300,4 +300,4 @@ def test_laws_of_installed_packages_are_found_by_name(monkeypatch):
     factory = load_nacelle_law("table")
     assert factory is not None
     assert isinstance(factory(), Table1Nacelle)
-    assert parsed('"table"').nacelle == "table"
+    assert parsed('"table"').options.nacelle == "table"
