@@ -11,6 +11,7 @@ import numpy as np
 
 from rtsim.choices import HAND_PILOT, CorridorName
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.loop.options import FlightOptions
 from rtsim.measures.metrics import flight_metrics
 from rtsim.measures.trial_metrics import TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
@@ -152,8 +153,9 @@ class Tester:
             options: Options of every flight instead of each scenario's, by field of ``FlightOptions``, SI.
 
         Raises:
-            InputError: There is no such law.
+            InputError: There is no such law, or an option is out of range.
         """
+        FlightOptions().changed(options)
         self._law, self._options = law, options
         self._folder = present_folder()
         self._benches: dict[tuple[str, str, int], Bench] = {}

@@ -187,11 +187,11 @@ def test_scenarios_choose_the_law():
         '[automatic]\nschedule = "points"\npoints = [{ airspeed_kt = 50, nacelle_deg = 90 },'
         " { airspeed_kt = 120, nacelle_deg = 0 }]",
     )
-    law = automatic_nacelle(own.nacelle, own.automatic, own.programme)
+    law = automatic_nacelle(own.options.nacelle, own.automatic, own.programme)
     assert law is not None
     assert to_deg(law.schedule.at(kt(85.0))) == pytest.approx(45.0)
     plain = parsed('"automatic"')
-    assert automatic_nacelle(plain.nacelle, plain.automatic, plain.programme) == AutomaticNacelle()
+    assert automatic_nacelle(plain.options.nacelle, plain.automatic, plain.programme) == AutomaticNacelle()
     assert automatic_nacelle("programme", plain.automatic, plain.programme) is None
 
 
