@@ -30,6 +30,7 @@ from rtsim.aircraft.variables import FLAP_INPUTS
 from rtsim.choices import AidName, SwitchName
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
+from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.units import deg
 
@@ -74,22 +75,24 @@ def design_aids(database: Database) -> AidTables:
         if name not in inputs:  # a database of one's own: the flaps stay where its schedule has them
             continue
         maps[MAP_STICK_FLAPS + k] = -reduced_b[..., 2, inputs.index(name)] / reduced_b[..., 2, stick]
-    return AidTables(
-        airspeed=database.airspeed,
-        nacelle=database.nacelle,
-        maps=maps,
-        schedule_time=2.0,
-        damping=1.5,
-        attitude_frequency=1.5,
-        attitude_damping=0.8,
-        authority=0.5,
-        rate_command=deg(10.0),
-        dead_zone=0.03,
-        altitude_frequency=0.5,
-        airspeed_frequency=0.25,
-        integral_time=10.0,
-        fade_time=1.0,
-        blend=(deg(30.0), deg(60.0)),
+    return packed(
+        AidTables(
+            airspeed=database.airspeed,
+            nacelle=database.nacelle,
+            maps=maps,
+            schedule_time=2.0,
+            damping=1.5,
+            attitude_frequency=1.5,
+            attitude_damping=0.8,
+            authority=0.5,
+            rate_command=deg(10.0),
+            dead_zone=0.03,
+            altitude_frequency=0.5,
+            airspeed_frequency=0.25,
+            integral_time=10.0,
+            fade_time=1.0,
+            blend=(deg(30.0), deg(60.0)),
+        )
     )
 
 

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
 from rtsim.aids.aids_kernels import AidTables
-from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.aircraft.xv15.tables import Configuration, ControlTables
 from rtsim.atmosphere.gust_kernels import GustTables
 from rtsim.choices import PilotMode
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.faults.fault_kernels import FaultTables
 from rtsim.frame import FloatArray
-from rtsim.loop.plant_kernels import AircraftFrame
-from rtsim.lpv.lpv_kernels import LpvTables
+from rtsim.kernels.packed import Address
+from rtsim.kernels.places import Places
 from rtsim.nacelle.automatic_kernels import AutomaticTables
 from rtsim.nacelle.nacelle_kernels import NacelleTables
 from rtsim.pilot.pilot_kernels import PilotTables
@@ -20,36 +23,72 @@ from rtsim.protection.law_data import ProtectionTables
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
 
-MODE_MOCM, MODE_EXTERNAL, MODE_HOLD = 0, 1, 2
-MODES: dict[PilotMode, int] = {
-    "mocm": MODE_MOCM,
-    "external": MODE_EXTERNAL,
-    "hold": MODE_HOLD,
-}
-"""Pilot modes by name, with their number in the ``pilot_mode`` column."""
-
-# Places in SimulationState.clock.
-CLOCK_FRAME, CLOCK_MODE, CLOCK_DISTANCE, CLOCK_FLAGS, CLOCK_END, CLOCK_SINK = 0, 1, 2, 3, 4, 5
-CLOCK_SIZE = 6
-# Places in SimulationState.reference: unfiltered airspeed command is a function of time and not kept.
-REFERENCE_AIRSPEED, REFERENCE_RATE = 0, 1
-REFERENCE_SIZE = 2
-# Why a flight ended by itself.
-END_NONE, END_CRASH, END_ATTITUDE, END_NOT_FINITE, END_GENTLE_LANDING, END_HARD_LANDING = 0, 1, 2, 3, 4, 5
-END_ROTORS_SLOW, END_ROTORS_FAST = 6, 7
+IntArray = npt.NDArray[np.int64]
+MODE = Places("mocm", "external", "hold")
+"""Who flies, as a number in the clock and in the ``pilot_mode`` column."""
+MODES: dict[PilotMode, int] = MODE.asdict()  # type: ignore[assignment]  # the names above
+"""Pilot modes by name."""
+CLOCK = Places("frame", "mode", "distance", "flags", "end", "sink", "faults", "missing")
+"""Frame number, who flies, distance flown [m], LPV flags, how the flight ended, sink rate at the end [m/s], whether a
+failure was thrown in, part that the
+coming frame needs and that is not compiled yet (1 + its place in ``PART``; 0 none)."""
+REFERENCE = Places("airspeed", "rate")
+"""The filtered airspeed reference [m/s] and its rate [m/s^2]."""
+END = Places(
+    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast"
+)  # fmt: skip
+"""Why a flight ended by itself."""
 END_REASONS = {
-    END_NONE: "",
-    END_CRASH: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
-    END_ATTITUDE: "control was lost: pitch attitude beyond 80 deg",
-    END_NOT_FINITE: "the model diverged: a state is no longer a finite number",
-    END_GENTLE_LANDING: "touched down gently, sinking at {sink:.1f} m/s",
-    END_HARD_LANDING: "landed hard, sinking at {sink:.1f} m/s",
-    END_ROTORS_SLOW: "rotor speed below 80 %: slower than can be flown",
-    END_ROTORS_FAST: "rotor speed above 115 %: faster than can be flown",
+    END.none: "",
+    END.crash: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
+    END.attitude: "control was lost: pitch attitude beyond 80 deg",
+    END.not_finite: "the model diverged: a state is no longer a finite number",
+    END.gentle_landing: "touched down gently, sinking at {sink:.1f} m/s",
+    END.hard_landing: "landed hard, sinking at {sink:.1f} m/s",
+    END.rotors_slow: "rotor speed below 80 %: slower than can be flown",
+    END.rotors_fast: "rotor speed above 115 %: faster than can be flown",
 }
-"""Why a flight ended by itself, by the code in the simulation's clock."""
-# The array handed to the pilot, see rtsim.pilot.pilot_kernels.
-TARGET_SIZE = 5
+"""The same in words."""
+TARGET = Places("airspeed", "airspeed_rate", "altitude", "climb_rate", "nacelle_rate")
+"""What the pilot is asked for, see ``rtsim.pilot.pilot_kernels``. SI."""
+PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
+"""Rows of the programme."""
+MOTION = Places("angle", "rate", "acceleration")
+"""The nacelles now [rad, rad/s, rad/s^2]."""
+STATION = Places("pilot", "hands", "aided", "protected", "acting")
+"""Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
+the aids; with the protection; what moves the controls."""
+CHANNEL = Places("stick", "lever", "nacelle_rate")
+"""Channels of a command: -1 to 1, 0 to 1, [rad/s]."""
+HELD = Places("stick", "lever", "nacelle_rate", "stick_reason", "lever_reason", "nacelle_reason")
+"""What laws in Python hold until their next decision (NaN: the channel is the pilot's), and the limits behind it."""
+PART = Places(
+    "outputs", "step", "ask", "advance", "engage", "decide", "aids", "air", "faults", "fail", "automatic_rate",
+    "automatic_advance", "script", "notice", "measure",
+)  # fmt: skip
+"""Parts of the frame that are compiled on their own, by their places in ``Flight.parts``: plant (outputs, step), pilot
+(ask, advance, engage), law (decide), pilot aids, gusts, failures (schedule, actuators), automatic nacelle, and what a
+batch hands in: a script (before, after the frame) and a measure of each row."""
+
+
+class PlantTables(NamedTuple):
+    """The aircraft that flies."""
+
+    aircraft: Address
+    """Its tables, whatever they are: the parts ``outputs`` and ``step`` know."""
+    configuration: Configuration
+    """Mass, air, rotor speed, flap."""
+    controls: ControlTables
+    """Mixing, limits, flap schedule."""
+
+
+class ScriptTables(NamedTuple):
+    """What scripted hands do besides the pilot, see ``rtsim.loop.script_kernels``."""
+
+    pulses: FloatArray
+    """Movements of the controls, shape (pulses, ``PULSE.size``)."""
+    reaction: float
+    """Time a warning must last until a pilot who yields gives up his plan [s]; negative: he never does."""
 
 
 class SimulationTables(NamedTuple):
@@ -59,10 +98,8 @@ class SimulationTables(NamedTuple):
     """Length of a frame [s]."""
     wind: float
     """Tailwind [m/s]."""
-    lpv: LpvTables
-    """The LPV aircraft."""
-    aircraft: AircraftTables | AircraftFrame
-    """The nonlinear aircraft where it flies; else what the frame reads of it."""
+    plant: PlantTables
+    """The aircraft."""
     nacelle: NacelleTables
     """Conversion actuator."""
     automatic: AutomaticTables
@@ -85,7 +122,9 @@ class SimulationTables(NamedTuple):
     protection: ProtectionTables
     """The compiled protection law; it acts after the aids, on what would move the controls."""
     programme: FloatArray
-    """Rows: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
+    """Rows ``PROGRAMME``: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
+    script: ScriptTables
+    """Scripted hands."""
     reference_frequency: float
     """Natural frequency of the critically damped airspeed reference filter [rad/s]."""
 
@@ -122,8 +161,12 @@ class SimulationState(NamedTuple):
     """Which failures are active."""
     protection: FloatArray
     """State of the protection law."""
+    held: FloatArray
+    """What laws in Python hold, ``HELD``."""
+    script: FloatArray
+    """State of the scripted hands."""
     clock: FloatArray
-    """Frame number, pilot mode, distance flown [m], LPV flags, end code, sink rate at the end [m/s]."""
+    """Frame number, pilot mode and how the flight stands, ``CLOCK``."""
 
 
 class Scratch(NamedTuple):
@@ -152,20 +195,31 @@ class Scratch(NamedTuple):
     target: FloatArray
     """What the pilot is asked for."""
     command: FloatArray
-    """Stick, lever, nacelle rate that are to act."""
-    hands: FloatArray
-    """The pilot's stick and lever, before the aids."""
+    """The command at its stations, shape (``STATION.size``, ``CHANNEL.size``)."""
     pilot: FloatArray
     """Work array of the pilot kernels."""
-    asked: FloatArray
-    """The pilot's command in a compiled run: stick, lever, nacelle rate."""
     planned: FloatArray
     """Where failed actuators stand after the frame."""
     gust: FloatArray
     """Gust of the next frame in body axes."""
     sensors: FloatArray
     """What the protection law may know."""
-    limited: FloatArray
-    """Stick, lever, nacelle rate as the law leaves them."""
     law: FloatArray
     """Work array of the law."""
+    row: FloatArray
+    """The frame's row, see ``rtsim.frame``."""
+
+
+class Flight(NamedTuple):
+    """One flight as the compiled frame sees it."""
+
+    tables: SimulationTables
+    """What the frame reads."""
+    state: SimulationState
+    """What it changes."""
+    scratch: Scratch
+    """Its work space."""
+    measures: FloatArray
+    """What the part ``measure`` adds to."""
+    parts: IntArray
+    """Addresses of the compiled parts, ``PART``; 0 where one is not needed, or not yet."""

@@ -12,18 +12,8 @@ from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.kernels.compiled import inner_kernel
-from rtsim.loop.data import (
-    CLOCK_DISTANCE,
-    CLOCK_FRAME,
-    CLOCK_MODE,
-    REFERENCE_AIRSPEED,
-    REFERENCE_RATE,
-    Scratch,
-    SimulationState,
-    SimulationTables,
-)
-from rtsim.loop.plant_kernels import plant_outputs
-from rtsim.nacelle.automatic_kernels import automatic_rate
+from rtsim.kernels.parts import call_at
+from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, TARGET, Flight
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.protection import law_data as law
 from rtsim.systems.drive_kernels import DEVIATION, engine_power
@@ -58,60 +48,61 @@ def programme_at(programme: FloatArray, row: int, time: float) -> float:
 
 
 @inner_kernel
-def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, row: FloatArray) -> None:
+def observe(flight: Flight) -> None:
     """Fill the row with all that is known before the command of this frame; changes no state.
 
     Args:
-        tables: The simulation.
-        state: Its state at the start of the frame.
-        scratch: Work space; afterwards holds outputs, margins and the pilot's target.
-        row: Written: the frame row, commands excepted.
+        flight: The flight; afterwards its work space holds outputs, margins, the pilot's target and the row, commands
+            excepted.
     """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    row = scratch.row
     x = state.x
     gusts = state.gusts
-    frame = state.clock[CLOCK_FRAME]
+    frame = state.clock[CLOCK.frame]
     time = frame * tables.dt
     nacelle_at(tables.nacelle, state.nacelle, 0.0, 0.0, scratch.motion)
-    angle, rate = scratch.motion[0], scratch.motion[1]
+    angle, rate = scratch.motion[MOTION.angle], scratch.motion[MOTION.rate]
     state.u[INPUT.nacelle_rate] = rate
-    state.u[INPUT.nacelle_acceleration] = scratch.motion[2]
+    state.u[INPUT.nacelle_acceleration] = scratch.motion[MOTION.acceleration]
     state.u[INPUT.gust_u] = gusts[G_U]
     state.u[INPUT.gust_w] = gusts[G_W]
     state.u[INPUT.gust_q] = gusts[G_Q]
     speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
-    flap_scheduled = nonlinear.flap_schedule(tables.aircraft.controls, speed, angle)
+    flap_scheduled = nonlinear.flap_schedule(tables.plant.controls, speed, angle)
     scratch.scheduled[0] = flap_scheduled
     flap_inputs(tables.flaps, state.flaps, flap_scheduled, state.u)
     state.u[INPUT.rotor_speed] = state.drive[DEVIATION]
-    plant_outputs(tables.aircraft, tables.lpv, x, state.u, angle, (scratch.y, scratch.xdot, scratch.work))
+    aircraft = tables.plant.aircraft
+    call_at(flight.parts[PART.outputs], aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     through = x[STATE.u] * ct + x[STATE.w] * st
     airspeed = through + gusts[G_AHEAD]
     climb = x[STATE.u] * st - x[STATE.w] * ct
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
-    _see(tables, state, scratch, airspeed)
+    _see(flight, airspeed)
     y = scratch.y
     rotor_speed = tables.drive.governed_speed + state.drive[DEVIATION]
     power = 2.0 * y[OUTPUT.torque] * rotor_speed
 
-    _ask(tables, state, scratch, time)
+    _ask(flight, time)
 
     row[COLUMN.frame] = frame
     row[COLUMN.time_s] = time
     row[COLUMN.airspeed_kt] = airspeed / KNOT
-    row[COLUMN.airspeed_reference_kt] = scratch.target[0] / KNOT
+    row[COLUMN.airspeed_reference_kt] = scratch.target[TARGET.airspeed] / KNOT
     row[COLUMN.nacelle_deg] = angle / DEGREE
     row[COLUMN.nacelle_reference_deg] = state.nacelle[0] / DEGREE
     row[COLUMN.altitude_m] = x[STATE.altitude]
     row[COLUMN.pitch_deg] = x[STATE.pitch] / DEGREE
     row[COLUMN.flapping_deg] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2) / DEGREE
     row[COLUMN.nacelle_rate_deg_s] = rate / DEGREE
-    row[COLUMN.airspeed_command_kt] = programme_at(tables.programme, 1, time) / KNOT
-    row[COLUMN.altitude_reference_m] = scratch.target[2]
+    row[COLUMN.airspeed_command_kt] = programme_at(tables.programme, PROGRAMME.airspeed, time) / KNOT
+    row[COLUMN.altitude_reference_m] = scratch.target[TARGET.altitude]
     row[COLUMN.airspeed_rate_kt_s] = y[OUTPUT.airspeed_rate] / KNOT
     row[COLUMN.ground_speed_kt] = (through + tables.wind) / KNOT
     row[COLUMN.climb_rate_m_s] = climb
-    row[COLUMN.distance_m] = state.clock[CLOCK_DISTANCE]
+    row[COLUMN.distance_m] = state.clock[CLOCK.distance]
     row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(through), 1.0)) / DEGREE
     row[COLUMN.angle_of_attack_deg] = (
         math.atan2(x[STATE.w] + gusts[G_W] + 4.5 * st, x[STATE.u] + gusts[G_U] + 4.5 * ct) / DEGREE
@@ -138,7 +129,7 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
     row[COLUMN.nacelle_forward_deg] = scratch.margins[2] / DEGREE
     row[COLUMN.nacelle_aft_deg] = scratch.margins[3] / DEGREE
     row[COLUMN.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
-    row[COLUMN.pilot_mode] = state.clock[CLOCK_MODE]
+    row[COLUMN.pilot_mode] = state.clock[CLOCK.mode]
     row[COLUMN.airspeed_indicated_kt] = scratch.shown[0] / KNOT
     row[COLUMN.gust_u_m_s] = gusts[G_U]
     row[COLUMN.gust_w_m_s] = gusts[G_W]
@@ -147,30 +138,29 @@ def observe(tables: SimulationTables, state: SimulationState, scratch: Scratch, 
 
 
 @inner_kernel
-def _ask(tables: SimulationTables, state: SimulationState, scratch: Scratch, time: float) -> None:
+def _ask(flight: Flight, time: float) -> None:
     """Fill what the pilot is asked for: filtered airspeed and its rate, altitude and climb rate, nacelle rate."""
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
     target = scratch.target
-    target[0] = state.reference[REFERENCE_AIRSPEED]
-    target[1] = state.reference[REFERENCE_RATE]
-    target[2] = programme_at(tables.programme, 3, time)
-    ahead = programme_at(tables.programme, 3, time + tables.dt)
-    target[3] = (ahead - target[2]) / tables.dt
-    wanted = programme_at(tables.programme, 2, time + tables.dt)
+    target[TARGET.airspeed] = state.reference[REFERENCE.airspeed]
+    target[TARGET.airspeed_rate] = state.reference[REFERENCE.rate]
+    target[TARGET.altitude] = programme_at(tables.programme, PROGRAMME.altitude, time)
+    ahead = programme_at(tables.programme, PROGRAMME.altitude, time + tables.dt)
+    target[TARGET.climb_rate] = (ahead - target[TARGET.altitude]) / tables.dt
+    wanted = programme_at(tables.programme, PROGRAMME.nacelle, time + tables.dt)
     wanted_rate = (wanted - state.nacelle[0]) / tables.dt
     if tables.automatic.active != 0:
-        speed_rate = scratch.y[OUTPUT.airspeed_rate]
-        wanted_rate = automatic_rate(
-            tables.automatic, state.automatic, scratch.shown[0], speed_rate, state.nacelle[0], tables.dt
-        )
-    target[4] = nacelle_assigned_rate(tables.nacelle, wanted_rate)
+        wanted_rate = call_at(flight.parts[PART.automatic_rate], flight)
+    target[TARGET.nacelle_rate] = nacelle_assigned_rate(tables.nacelle, wanted_rate)
 
 
 @inner_kernel
-def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, airspeed: float) -> None:
+def _see(flight: Flight, airspeed: float) -> None:
     """Fill what pilots and laws are shown: indicated airspeed, its margins, and the state shifted to agree with it.
 
     The shift is along the horizon, so that the climb rate computed from the seen state stays the true one.
     """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
     x, seen, shown = state.x, scratch.seen, scratch.shown
     error = fault_airspeed_error(state.faults, airspeed)
     shown[0] = airspeed + error
@@ -178,7 +168,7 @@ def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, air
         for k in range(scratch.margins.shape[0]):
             shown[1 + k] = scratch.margins[k]
     else:
-        corridor_margins(tables.corridor, shown[0], scratch.motion[0], shown[1:])
+        corridor_margins(tables.corridor, shown[0], scratch.motion[MOTION.angle], shown[1:])
     for k in range(x.shape[0]):
         seen[k] = x[k]
     shift = state.gusts[G_AHEAD] + error
@@ -188,21 +178,19 @@ def _see(tables: SimulationTables, state: SimulationState, scratch: Scratch, air
 
 
 @inner_kernel
-def sense(state: SimulationState, scratch: Scratch, row: FloatArray, sensors: FloatArray) -> None:
-    """Give what a protection law may know, the numbers of ``Simulation.sensors``.
+def sense(flight: Flight) -> None:
+    """Give what pilots and laws may know, as the work space's ``sensors``. SI.
 
     Args:
-        state: The simulation's state.
-        scratch: Its work space as ``observe`` left it.
-        row: The frame's row as ``observe`` left it.
-        sensors: Written, shape (SENSOR_COUNT,), SI.
+        flight: The flight as ``observe`` left it.
     """
-    x = state.x
+    state, scratch = flight.state, flight.scratch
+    x, row, sensors = state.x, scratch.row, scratch.sensors
     sensors[law.SENSE_TIME] = row[COLUMN.time_s]
     sensors[law.SENSE_AIRSPEED] = row[COLUMN.airspeed_indicated_kt] * KNOT
     sensors[law.SENSE_AIRSPEED_RATE] = row[COLUMN.airspeed_rate_kt_s] * KNOT
-    sensors[law.SENSE_NACELLE] = scratch.motion[0]
-    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[1]
+    sensors[law.SENSE_NACELLE] = scratch.motion[MOTION.angle]
+    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[MOTION.rate]
     sensors[law.SENSE_PITCH] = x[STATE.pitch]
     sensors[law.SENSE_PITCH_RATE] = x[STATE.q]
     sensors[law.SENSE_FLIGHT_PATH] = row[COLUMN.flight_path_deg] * DEGREE

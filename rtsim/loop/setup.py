@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,30 +12,37 @@ import numpy as np
 from rtsim.aids import design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition
-from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
+from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
-from rtsim.choices import PlantName, SwitchName
-from rtsim.corridor.corridor_kernels import MARGIN_COUNT, new_level_state
+from rtsim.choices import CorridorName, PlantName, SwitchName
+from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import COLUMN, FloatArray
-from rtsim.loop import advance_kernels as kernels
+from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.packed import Address, packed
+from rtsim.loop import frame_kernels as frames_of
 from rtsim.loop.data import (
-    CLOCK_MODE,
-    CLOCK_SIZE,
-    MODE_EXTERNAL,
-    MODE_MOCM,
-    TARGET_SIZE,
+    CHANNEL,
+    CLOCK,
+    HELD,
+    MODES,
+    MOTION,
+    STATION,
+    TARGET,
+    PlantTables,
     Scratch,
+    ScriptTables,
     SimulationState,
     SimulationTables,
 )
-from rtsim.loop.observe_kernels import observe
+from rtsim.loop.flying import Flying, Measure, new_streams
 from rtsim.loop.options import FlightOptions
-from rtsim.loop.plant_kernels import AircraftFrame
+from rtsim.loop.script import Pulse, pulse_table
+from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
@@ -51,7 +59,7 @@ from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
-from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE
+from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
@@ -77,6 +85,10 @@ class FlightSetup:
     """Trimmed condition at frame 0; None: the programme's first point."""
     air: AirSpecification = CALM
     """Gusts and turbulence."""
+    pulses: tuple[Pulse, ...] = ()
+    """What scripted hands do to the controls besides the pilot."""
+    reaction: float | None = None
+    """A pilot who yields: how long a warning lasts before he gives up his plan [s]; None: he never does."""
     faults: tuple[Fault, ...] = ()
     """Failures and their times."""
     automatic_nacelle: AutomaticNacelle | None = None
@@ -86,19 +98,19 @@ class FlightSetup:
         """The setup with other options.
 
         Args:
-            changes: Values by field of :class:`FlightOptions`, SI.
+            changes: Values by field of :class:`~rtsim.loop.options.FlightOptions`, SI.
         """
         return dataclasses.replace(self, options=self.options.changed(changes))
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Tables and work space of one simulation."""
+    """Everything of a flight that flying does not change."""
 
     tables: SimulationTables
     """Parameters of the frame."""
-    scratch: Scratch
-    """Work space of the frame."""
+    nonlinear: bool
+    """The nonlinear aircraft flies."""
     noise_width: int
     """Standard normals the pilot takes per frame; 0 with the noise off."""
     database_hash: str
@@ -116,8 +128,49 @@ def _start(setup: FlightSetup) -> tuple[float, float, float]:
     return start.airspeed, start.nacelle_angle, start.altitude
 
 
+@functools.lru_cache(maxsize=16)
+def start_trim(nonlinear: bool, database: Database, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
+    """Trimmed state and inputs in level flight, altitude 0, read-only; kept, since batches start alike.
+
+    Args:
+        nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
+        database: The LPV aircraft.
+        airspeed: Airspeed [m/s].
+        nacelle: Nacelle angle [rad].
+
+    Raises:
+        InputError: There is no trim.
+    """
+    if nonlinear:
+        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
+        converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
+    else:
+        point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=nacelle)
+        converged, x, u = point.converged, point.x.copy(), point.u.copy()
+    if not converged:
+        raise InputError(
+            "the aircraft has no level-flight trim there",
+            key="start",
+            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
+            mend="start inside the conversion corridor (rtsim corridor shows it)",
+        )
+    x.setflags(write=False)
+    u.setflags(write=False)
+    return x, u
+
+
+@functools.lru_cache(maxsize=8)
+def _corridor_tables(name: CorridorName, database: Database) -> CorridorTables:
+    return packed(load_boundary(name, database).tables())
+
+
+@functools.lru_cache(maxsize=16)
+def _law(name: str, boundary: CorridorName, database: Database, dt: float) -> ProtectionTables:
+    return packed(law_tables(name, database, dt=dt, boundary=boundary))
+
+
 def build_parts(setup: FlightSetup) -> Parts:
-    """Load database, gains and corridor, and trim at the start.
+    """Load database, gains and corridor, and trim at the start; everything costly is loaded once and shared.
 
     Args:
         setup: The flight.
@@ -128,77 +181,41 @@ def build_parts(setup: FlightSetup) -> Parts:
     options = setup.options
     loaded = load_database(options.database or None)
     database = flown_database(loaded, options.database or None)
-    lpv_aircraft = LpvAircraft(database)
-    nonlinear_aircraft = Xv15.load()
+    nonlinear = options.plant == "nonlinear"
+    own = Xv15.load().tables
     airspeed, nacelle, altitude = _start(setup)
-    if options.plant == "nonlinear":
-        trim = nonlinear_aircraft.trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
-        converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
-    else:
-        point = lpv_aircraft.trim(airspeed=airspeed, nacelle=nacelle)
-        converged, x, u = point.converged, point.x.copy(), point.u.copy()
-    if not converged:
-        raise InputError(
-            "the aircraft has no level-flight trim there",
-            key="start",
-            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
-            mend="start inside the conversion corridor (rtsim corridor shows it)",
-        )
+    x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle))
     x[STATE.altitude] = altitude
     programme = setup.programme
-    own = nonlinear_aircraft.tables
+    dt, corridor = 1.0 / options.rate_hz, options.corridor_name
+    pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
     tables = SimulationTables(
-        dt=1.0 / options.rate_hz,
+        dt=dt,
         wind=float(options.wind),
-        lpv=prepare_tables(database, PLANT_FORMS[options.plant]),
-        aircraft=own if options.plant == "nonlinear" else AircraftFrame(own.configuration, own.controls),
+        plant=PlantTables(
+            aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[options.plant])),
+            configuration=own.configuration,
+            controls=own.controls,
+        ),
         nacelle=load_nacelle_tables(),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
-        corridor=load_boundary(options.corridor_name, database).tables(),
-        pilot=load_pilot_tables(database, options.outer_loop, dt=1.0 / options.rate_hz),
+        corridor=_corridor_tables(corridor, database),
+        pilot=pilot,
         flaps=load_flap_tables(own),
         drive=load_drive_tables(own),
         aids=design_aids(database),
         gusts=gust_tables(setup.air),
         faults=fault_tables(setup.faults),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
-        protection=law_tables(
-            compiled_law(load_laws(options.protection)) or "monitor",
-            database,
-            dt=1.0 / options.rate_hz,
-            boundary=options.corridor_name,
-        ),
+        protection=_law(compiled_law(load_laws(options.protection)) or "monitor", corridor, database, dt),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
+        script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
         reference_frequency=REFERENCE_FREQUENCY,
-    )
-    states = len(STATES)
-    work = max(work_size(tables.lpv), nonlinear.WORK_COUNT + 6 * states)
-    scratch = Scratch(
-        work=np.zeros(work),
-        y=np.zeros(len(OUTPUTS)),
-        xdot=np.zeros(states),
-        path=np.zeros((3, 3)),
-        motion=np.zeros(3),
-        scheduled=np.zeros(1),
-        flaps=np.zeros(3),
-        margins=np.zeros(MARGIN_COUNT),
-        shown=np.zeros(1 + MARGIN_COUNT),
-        seen=np.zeros(states),
-        target=np.zeros(TARGET_SIZE),
-        command=np.zeros(3),
-        hands=np.zeros(2),
-        pilot=np.zeros(pilot_work_size(tables.pilot)),
-        asked=np.zeros(3),
-        planned=np.zeros(3),
-        gust=np.zeros(3),
-        sensors=np.zeros(SENSOR_COUNT),
-        limited=np.zeros(3),
-        law=np.zeros(WORK_SIZE),
     )
     return Parts(
         tables=tables,
-        scratch=scratch,
-        noise_width=noise_width(tables.pilot) if options.pilot_noise else 0,
+        nonlinear=nonlinear,
+        noise_width=interpreted(noise_width)(pilot) if options.pilot_noise else 0,
         database_hash=loaded.content_hash,
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
@@ -206,13 +223,47 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
+def new_scratch(tables: SimulationTables) -> Scratch:
+    """Work space for a flight.
+
+    Args:
+        tables: What flies.
+    """
+    states = len(STATES)
+    work = nonlinear_kernels.WORK_COUNT + 6 * states
+    lpv = tables.plant.aircraft.target
+    if hasattr(lpv, "cells"):
+        work = max(work, interpreted(work_size)(lpv))
+    return Scratch(
+        work=np.zeros(work),
+        y=np.zeros(len(OUTPUTS)),
+        xdot=np.zeros(states),
+        path=np.zeros((3, 3)),
+        motion=np.zeros(MOTION.size),
+        scheduled=np.zeros(1),
+        flaps=np.zeros(3),
+        margins=np.zeros(MARGIN_COUNT),
+        shown=np.zeros(1 + MARGIN_COUNT),
+        seen=np.zeros(states),
+        target=np.zeros(TARGET.size),
+        command=np.zeros((STATION.size, CHANNEL.size)),
+        pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
+        planned=np.zeros(3),
+        gust=np.zeros(3),
+        sensors=np.zeros(SENSOR_COUNT),
+        law=np.zeros(WORK_SIZE),
+        row=np.zeros(SIGNAL_COUNT),
+    )
+
+
 def _needed_aids(setup: FlightSetup, database: Database) -> tuple[SwitchName, ...]:
+    options = setup.options
     needed: list[SwitchName] = []
-    if setup.options.plant != "nonlinear" and not moves_flaps(database):
+    if options.plant != "nonlinear" and not moves_flaps(database):
         needed.append("automatic_flaps")
-    if setup.options.plant != "nonlinear" and not turns_rotors(database):
+    if options.plant != "nonlinear" and not turns_rotors(database):
         needed.append("governor")
-    for name, on in (("automatic_flaps", setup.options.automatic_flaps), ("governor", setup.options.governor)):
+    for name, on in (("automatic_flaps", options.automatic_flaps), ("governor", options.governor)):
         if name in needed and not on:
             raise needed_aid_error(name)
     return tuple(needed)
@@ -234,7 +285,7 @@ def needed_aid_error(name: str) -> InputError:
 
 
 def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> SimulationState:
-    """The state at frame 0: trimmed, filters at rest, the pilot engaged without a step.
+    """The state at frame 0, trimmed, filters at rest; the pilot is yet to be engaged.
 
     Args:
         setup: The flight.
@@ -243,10 +294,12 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     """
     options = setup.options
     airspeed, nacelle, _ = _start(setup)
-    clock = np.zeros(CLOCK_SIZE)
-    clock[CLOCK_MODE] = MODE_MOCM if options.mocm_begins else MODE_EXTERNAL
+    clock = np.zeros(CLOCK.size)
+    clock[CLOCK.mode] = MODES["mocm" if options.mocm_begins else "external"]
     u = parts.start_u.copy()
     u[INPUT.nacelle_rate :] = 0.0
+    held = np.full(HELD.size, np.nan)
+    held[HELD.stick_reason :] = 0.0
     state = SimulationState(
         x=parts.start_x.copy(),
         u=u,
@@ -254,7 +307,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         automatic=np.zeros(AUTOMATIC_STATE_SIZE),
         reference=np.array([airspeed, 0.0]),
         level=new_level_state(),
-        pilot=np.zeros(pilot_state_size(parts.tables.pilot)),
+        pilot=np.zeros(interpreted(pilot_state_size)(parts.tables.pilot)),
         aids=np.zeros(AID_STATE_SIZE),
         switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
@@ -262,19 +315,67 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         gusts=new_gust_state(setup.air, air_normals),
         faults=new_fault_state(),
         protection=np.zeros(LAW_STATE_SIZE),
+        held=held,
+        script=new_script_state(),
         clock=clock,
     )
     state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(options.automatic_flaps), float(options.governor)
     state.flaps[FLAP_FOLLOWS], state.flaps[FLAP_SETTING] = 1.0, NO_SETTING
     state.drive[GOVERNED] = 1.0
-    law_start(parts.tables.protection, state.protection)
+    interpreted(law_start)(parts.tables.protection, state.protection)
     if options.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
-    kernels.disturb(parts.tables, state, parts.scratch, 0.0, np.zeros(3))
-    row = np.zeros(len(COLUMN))
-    observe(parts.tables, state, parts.scratch, row)
-    kernels.engage_pilot(parts.tables, state, parts.scratch)
     return state
 
 
-__all__ = ["FlightSetup", "Parts", "build_parts", "needed_aid_error", "start_state"]
+def prepare(
+    setup: FlightSetup,
+    parts: Parts | None = None,
+    *,
+    measure: tuple[Measure, FloatArray] | None = None,
+    unlocked: bool = False,
+) -> Flying:
+    """Put the aircraft at the start of a flight, ready for frame 0.
+
+    Args:
+        setup: The flight.
+        parts: Its parts, where the caller changed some; None: as ``build_parts`` makes them.
+        measure: A compiled part that measures each frame, and the array that it adds to.
+        unlocked: Fly outside Python's lock, for batches in threads.
+
+    Returns:
+        The flight.
+
+    Raises:
+        InputError: The start has no trim, or something that was asked for does not exist.
+    """
+    parts = build_parts(setup) if parts is None else parts
+    streams = new_streams(setup.options.seed)
+    flying = Flying(
+        parts.tables,
+        start_state(setup, parts, streams[1].standard_normal(3)),
+        new_scratch(parts.tables),
+        streams=streams,
+        nonlinear=parts.nonlinear,
+        noise_width=parts.noise_width,
+        measure=measure,
+        unlocked=unlocked,
+    )
+    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+    return flying
+
+
+def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
+    """Put a flight back to its start, random streams included.
+
+    Args:
+        flying: The flight; its arrays are overwritten.
+        setup: What it was set up with.
+        parts: Its parts.
+    """
+    flying.streams = new_streams(setup.options.seed)
+    flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
+    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+
+
+__all__ = ["FlightSetup", "Parts", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]

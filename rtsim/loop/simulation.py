@@ -3,44 +3,35 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rtsim.aids import SWITCHES, switch_of
-from rtsim.aircraft.variables import INPUT, STATE
+from rtsim.aircraft.variables import INPUT
 from rtsim.atmosphere import Gust, Turbulence
-from rtsim.atmosphere.air import add_gust, normals_needed, set_turbulence
+from rtsim.atmosphere.air import add_gust, set_turbulence
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
 from rtsim.faults import Fault, FaultSwitch
-from rtsim.faults.fault_kernels import fault_apply, fault_nacelle_ok
+from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
-from rtsim.loop import advance_kernels as kernels
-from rtsim.loop.data import (
-    CLOCK_END,
-    CLOCK_FLAGS,
-    CLOCK_FRAME,
-    CLOCK_MODE,
-    CLOCK_SINK,
-    END_NONE,
-    END_REASONS,
-    MODES,
-    SimulationState,
-)
-from rtsim.loop.observe_kernels import observe
-from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, start_state
+from rtsim.kernels.compiled import interpreted
+from rtsim.loop.data import CLOCK, END_REASONS, MODES, STATION, TARGET, SimulationState
+from rtsim.loop.flying import WHOLE, Flying
+from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, ENGAGE, LIMIT, OBSERVE, SCRIPT
+from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import L_OVERRIDE
 from rtsim.protection.laws import load_laws
-from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 from rtsim.systems.flap_kernels import FLAP_SETTING
 from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, trim_throttle
-from rtsim.units import DEGREE, INCH_POUND, KNOT
+from rtsim.units import KNOT
 
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
@@ -55,7 +46,7 @@ class Snapshot:
     state: SimulationState
     """Copies of every array the frame changes."""
     random_stream: dict[str, Any]
-    """State of the generators of pilot noise and turbulence, and the noise drawn for this frame."""
+    """State of the generators of pilot noise and turbulence."""
     laws: ChainSnapshot | None = None
     """State of the protection laws written in Python; None where there is none."""
 
@@ -66,31 +57,30 @@ class Simulation:
     The same compiled frame serves ``step`` and ``run``; both give the same numbers bit for bit.
     """
 
-    def __init__(self, setup: FlightSetup) -> None:
+    def __init__(self, setup: FlightSetup, *, parts: Parts | None = None, laws: LawChain | None = None) -> None:
         """Load the parts and put the aircraft at the start.
 
         Args:
             setup: What flies, how and from where.
+            parts: Its parts, where the caller changed some; None: as ``build_parts`` makes them.
+            laws: Laws in Python in place of the setup's protection.
 
         Raises:
             InputError: The start has no trim or lies outside the database.
         """
         self.setup = setup
-        self._parts: Parts = build_parts(setup)
-        self.tables = self._parts.tables
-        self._random = stream_generator(setup.options.seed, STREAM_PILOT)
-        self._air_random = stream_generator(setup.options.seed, STREAM_TURBULENCE)
-        self._state = start_state(setup, self._parts, self._air_random.standard_normal(3))
-        self._scratch = self._parts.scratch
-        self._noise_width = self._parts.noise_width
-        self._row = np.zeros(SIGNAL_COUNT)
-        self._command = np.zeros(3)
-        self._applied = np.zeros(3)
-        self._observed = False
-        self._noise = np.zeros(self._noise_width)
-        options = setup.options
-        laws = load_laws(options.protection, boundary=options.corridor_name, database=options.database)
-        self.laws = LawChain(laws, dt=self.tables.dt) if compiled_law(laws) is None else None
+        self._parts: Parts = build_parts(setup) if parts is None else parts
+        self.flying: Flying = prepare(setup, self._parts)
+        """The flight as it is flown."""
+        self.tables = self.flying.tables
+        self._state, self._scratch = self.flying.state, self.flying.scratch
+        self._row = self._scratch.row
+        self._observed = True
+        if laws is None:
+            options = setup.options
+            chain = load_laws(options.protection, boundary=options.corridor_name, database=options.database)
+            laws = LawChain(chain, dt=self.tables.dt) if compiled_law(chain) is None else None
+        self.laws = laws
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
 
     @property
@@ -101,7 +91,7 @@ class Simulation:
     @property
     def frame_index(self) -> int:
         """Number of the frame that starts now."""
-        return int(self._state.clock[CLOCK_FRAME])
+        return int(self._state.clock[CLOCK.frame])
 
     @property
     def time(self) -> float:
@@ -111,18 +101,17 @@ class Simulation:
     @property
     def finished(self) -> bool:
         """The flight ended by itself; ``end_reason`` says why."""
-        return bool(self._state.clock[CLOCK_END] != END_NONE)
+        return self.flying.ended
 
     @property
     def end_reason(self) -> str:
         """Why the flight ended by itself; empty while it has not."""
-        clock = self._state.clock
-        return END_REASONS[int(clock[CLOCK_END])].format(sink=float(clock[CLOCK_SINK]))
+        return self.flying.end_reason
 
     @property
     def mode(self) -> PilotMode:
         """Who flies."""
-        number = int(self._state.clock[CLOCK_MODE])
+        number = int(self._state.clock[CLOCK.mode])
         return next(name for name, value in MODES.items() if value == number)
 
     @property
@@ -133,53 +122,25 @@ class Simulation:
     @property
     def outside_grid(self) -> int:
         """Flags of the last LPV step: 0 inside the grid, else bits as in ``rtsim.lpv.lpv_kernels``."""
-        return int(self._state.clock[CLOCK_FLAGS])
+        return int(self._state.clock[CLOCK.flags])
 
     def warm_up(self) -> None:
-        """Compile or load every kernel of the frame; the state stays untouched."""
+        """Compile or load what the coming frames need; the state stays untouched."""
         snapshot = self.snapshot()
-        self.step()
-        self.step(Command(0.0, 0.5, 0.0))
-        self.set_pilot("external")
-        self.set_pilot("mocm")
-        self.set_fault(Fault(kind="nacelle-jammed", start=0.0), on=True)
-        self.set_turbulence(Turbulence.of_severity("light"))
-        self.run(2)
         self.step()
         self.restore(snapshot)
 
     def reset(self) -> None:
         """Go back to frame 0, random stream included."""
-        self._random = stream_generator(self.setup.options.seed, STREAM_PILOT)
-        self._air_random = stream_generator(self.setup.options.seed, STREAM_TURBULENCE)
-        fresh = start_state(self.setup, self._parts, self._air_random.standard_normal(3))
-        for mine, start in zip(self._state, fresh, strict=True):
-            mine[:] = start
+        restart(self.flying, self.setup, self._parts)
         if self.laws is not None:
             self.laws.reset()
-        self._observed = False
+        self._observed = True
 
     def sensors(self) -> Sensors:
         """The aircraft at the start of this frame as pilots and laws may know it."""
-        row = self._observe()
-        x = self._state.x
-        return Sensors(
-            time=float(row[COLUMN.time_s]),
-            airspeed=float(row[COLUMN.airspeed_indicated_kt]) * KNOT,
-            airspeed_rate=float(row[COLUMN.airspeed_rate_kt_s]) * KNOT,
-            nacelle_angle=float(self._scratch.motion[0]),
-            nacelle_rate=float(self._scratch.motion[1]),
-            pitch=float(x[STATE.pitch]),
-            pitch_rate=float(x[STATE.q]),
-            flight_path_angle=float(row[COLUMN.flight_path_deg]) * DEGREE,
-            altitude=float(x[STATE.altitude]),
-            climb_rate=float(row[COLUMN.climb_rate_m_s]),
-            load_factor=float(row[COLUMN.load_factor]),
-            mast_torque=float(row[COLUMN.mast_torque_inlb]) * INCH_POUND,
-            flapping=float(row[COLUMN.flapping_deg]) * DEGREE,
-            on_downstop=bool(row[COLUMN.on_downstop]),
-            nacelle_ok=bool(fault_nacelle_ok(self._state.faults)),
-        )
+        self._observe()
+        return sensors_of(self._scratch.sensors)
 
     def reference(self) -> Reference:
         """What the programme asks for in this frame."""
@@ -187,11 +148,11 @@ class Simulation:
         target = self._scratch.target
         wanted = self.setup.programme.at(self.time)
         return Reference(
-            airspeed=float(target[0]),
-            airspeed_rate=float(target[1]),
+            airspeed=float(target[TARGET.airspeed]),
+            airspeed_rate=float(target[TARGET.airspeed_rate]),
             nacelle_angle=wanted.nacelle_angle,
-            nacelle_rate=float(target[4]),
-            altitude=float(target[2]),
+            nacelle_rate=float(target[TARGET.nacelle_rate]),
+            altitude=float(target[TARGET.altitude]),
         )
 
     def margins(self) -> Margins:
@@ -201,89 +162,58 @@ class Simulation:
         return Margins(low=low, high=high, nacelle_forward=forward, nacelle_aft=aft)
 
     def pilot_command(self) -> Command:
-        """The built-in MOCM's command for the frame that starts now; changes nothing."""
-        self._observe()
-        kernels.pilot_command(self.tables, self._state, self._scratch, self._command)
-        stick, lever, rate = (float(value) for value in self._command)
-        return Command(stick, lever, rate)
+        """The built-in MOCM's command for the frame that starts now, with what scripted hands do."""
+        self.flying.do(CONSULT | SCRIPT if self._observed else OBSERVE | CONSULT | SCRIPT)
+        self._observed = True
+        return Command(*self._scratch.command[STATION.pilot].tolist())
 
-    def step(self, command: Command | None = None, *, applied: Command | None = None) -> FloatArray:
+    def step(
+        self, command: Command | None = None, *, applied: Command | None = None, scripted: bool = False
+    ) -> FloatArray:
         """Fly one frame.
 
         Args:
             command: The pilot's output; None: the built-in MOCM, or the held command in mode ``hold``.
-            applied: The command after protection; None: the pilot's own.
+            applied: The command that goes to aids and protection in its place; None: the pilot's own.
+            scripted: The flight's script changes the command that is given.
 
         Returns:
             The frame's row, shape (SIGNAL_COUNT,), a new array.
         """
-        if command is None and applied is None and not self._observed and self.laws is None:
-            # One call instead of three: handing the tables over costs more than the frame itself.
-            if self._noise_width:
-                self._noise[:] = self._random.standard_normal(self._noise_width)
-            air_noise = self._air_random.standard_normal((1, normals_needed(self._state.gusts)))
-            kernels.run_frames(
-                self.tables, self._state, self._scratch, self._noise[None, :], air_noise, self._row[None, :]
-            )
-            return self._row.copy()
-        self._observe()
-        if command is not None:
-            self._command[:] = command.stick, command.lever, command.nacelle_rate
-        elif self.mode == "mocm":
-            kernels.pilot_command(self.tables, self._state, self._scratch, self._command)
+        rows: FloatArray = np.empty((1, SIGNAL_COUNT))
+        row: FloatArray = rows[0]
+        if command is None and applied is None:
+            self._fly(rows, 1, WHOLE)
+            return row
+        stations = self._scratch.command
+        if command is None:
+            self.flying.do(OBSERVE | ASK | SCRIPT)
         else:
-            self._command[:] = self._state.u[INPUT.stick], self._state.u[INPUT.lever], 0.0
-        if applied is None:
-            self._applied[:] = self._command
-        else:
-            self._applied[:] = applied.stick, applied.lever, applied.nacelle_rate
-        if not (np.isfinite(self._command).all() and np.isfinite(self._applied).all()):
-            raise InputError(
-                "the command is not a finite number",
-                key="command",
-                value=tuple(float(v) for v in self._applied),
-                mend="give stick, lever and nacelle rate as finite numbers",
-            )
-        air_noise = self._air_random.standard_normal(normals_needed(self._state.gusts))
-        parts = (self.tables, self._state, self._scratch, self._row)
-        if self.laws is None:
-            kernels.advance(*parts, (self._command, self._applied, self._noise, air_noise))
-        else:
-            kernels.shape(self.tables, self._state, self._scratch, self._applied)
-            kernels.limit(*parts)
-            self._limit_in_python(self.laws)
-            kernels.complete(*parts, (self._command, self._noise, air_noise))
-        self._observed = False
-        return self._row.copy()
+            stations[STATION.pilot] = stations[STATION.hands] = _numbers(command)
+        if applied is not None:
+            stations[STATION.hands] = _numbers(applied)
+        self._fly(rows, 1, OBSERVE | LIMIT | COMPLETE | (SCRIPT if scripted else 0))
+        return row
 
-    def run(self, frames: int) -> FloatArray:
-        """Fly frames in one compiled call with built-in parts only.
+    def run(self, frames: int, rows: FloatArray | None = None) -> FloatArray:
+        """Fly frames in compiled code; only laws in Python are asked in between.
 
         Args:
             frames: How many; fewer are flown if the flight ends by itself.
+            rows: Written instead of a new array, shape (at least frames, SIGNAL_COUNT).
 
         Returns:
             The rows, shape (frames flown, SIGNAL_COUNT).
         """
-        rows = np.zeros((frames, SIGNAL_COUNT))
-        if self.laws is not None:
-            flown = 0
-            while flown < frames and not self.finished:
-                rows[flown] = self.step()
-                flown += 1
-            return rows[:flown]
-        noise = np.zeros((frames, self._noise_width))
-        if self._noise_width and frames:
-            # The noise of an already observed frame is drawn; the rest follows in the same order as by step.
-            first = 1 if self._observed else 0
-            if first:
-                noise[0] = self._noise
-            noise[first:] = self._random.standard_normal((frames - first, self._noise_width))
-        air_noise = self._air_random.standard_normal((frames, normals_needed(self._state.gusts)))
-        flown = int(kernels.run_frames(self.tables, self._state, self._scratch, noise, air_noise, rows))
-        if frames:
-            self._observed = False
-        return rows[:flown]
+        rows = np.empty((frames, SIGNAL_COUNT)) if rows is None else rows
+        return rows[: self._fly(rows, frames, WHOLE)]
+
+    def _fly(self, rows: FloatArray, frames: int, stages: int) -> int:
+        """Fly frames, the first with these stages, asking the laws in Python where they are due."""
+        self._observed = False
+        if self.laws is None:
+            return self.flying.fly(rows, frames, stages)
+        return fly_with_laws(self.flying, self.laws, rows, frames, stages)
 
     def set_pilot(self, mode: PilotMode, *, command: Command | None = None) -> None:
         """Hand the controls over from this frame on; the MOCM picks up without a step of the controls.
@@ -295,9 +225,9 @@ class Simulation:
         if command is not None:
             self._state.u[INPUT.stick], self._state.u[INPUT.lever] = command.stick, command.lever
         if mode == "mocm" and self.mode != "mocm":
-            self._observe()
-            kernels.engage_pilot(self.tables, self._state, self._scratch)
-        self._state.clock[CLOCK_MODE] = MODES[mode]
+            self.flying.do(OBSERVE | ENGAGE)
+            self._observed = True
+        self._state.clock[CLOCK.mode] = MODES[mode]
         if self._observed:
             self._row[COLUMN.pilot_mode] = MODES[mode]
 
@@ -369,10 +299,10 @@ class Simulation:
         self._observe()
         airspeed = float(self._row[COLUMN.airspeed_kt]) * KNOT
         state, frequency = self._state, self.tables.nacelle.frequency
-        fault_apply(
-            state.faults, fault_change(fault, on=on, time=self.time), state.x, state.nacelle, frequency, airspeed
-        )
-        observe(self.tables, state, self._scratch, self._row)
+        change = fault_change(fault, on=on, time=self.time)
+        interpreted(fault_apply)(state.faults, change, state.x, state.nacelle, frequency, airspeed)
+        state.clock[CLOCK.faults] = 1.0
+        self._observed = False
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air or let something fail or mend, from now on.
@@ -407,7 +337,7 @@ class Simulation:
         Args:
             turbulence: What it becomes; its ``fade_in`` is the time of the change.
         """
-        set_turbulence(self._state.gusts, turbulence, self._air_random.standard_normal(3))
+        set_turbulence(self._state.gusts, turbulence, self.flying.streams[1].standard_normal(3))
 
     def set_protection_override(self, on: bool) -> None:
         """Take the authority from the protection, or give it back, from this frame on; it goes on watching.
@@ -422,35 +352,10 @@ class Simulation:
         """Whether the pilot has taken the authority from the protection."""
         return float(self._state.protection[L_OVERRIDE]) != 0.0
 
-    def _limit_in_python(self, laws: LawChain) -> None:
-        """Let the laws in Python limit what is to act, and record what they changed."""
-        acting = self._scratch.command
-        stick, lever, rate = (float(value) for value in acting)
-        command = Command(stick, lever, rate)
-        if laws.due(self.frame_index):
-            laws.decide(self.frame_index, self.sensors(), command, self.margins())
-        if self.protection_overridden:
-            return
-        limited = laws.apply(command)
-        if limited is command:
-            return
-        acting[:] = limited.stick, limited.lever, limited.nacelle_rate
-        row, reasons = self._row, laws.reasons
-        row[COLUMN.protection_stick] = limited.stick - stick
-        row[COLUMN.protection_lever] = limited.lever - lever
-        row[COLUMN.protection_nacelle_rate_deg_s] = (limited.nacelle_rate - rate) / DEGREE
-        row[COLUMN.protection_stick_reason] = reasons[0]
-        row[COLUMN.protection_lever_reason] = reasons[1]
-        row[COLUMN.protection_nacelle_reason] = reasons[2]
-
     def snapshot(self) -> Snapshot:
         """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""
-        self._observe()
-        noise_state = {
-            "generator": self._random.bit_generator.state,
-            "drawn": self._noise.copy(),
-            "air": self._air_random.bit_generator.state,
-        }
+        pilot, air = self.flying.streams
+        noise_state = {"generator": pilot.bit_generator.state, "air": air.bit_generator.state}
         laws = self.laws.snapshot() if self.laws is not None else None
         return Snapshot(SimulationState(*(array.copy() for array in self._state)), noise_state, laws)
 
@@ -460,20 +365,69 @@ class Simulation:
         Args:
             snapshot: From ``snapshot`` of a simulation with the same setup.
         """
-        for mine, saved in zip(self._state, snapshot.state, strict=True):
-            mine[:] = saved
-        self._random.bit_generator.state = snapshot.random_stream["generator"]
-        self._air_random.bit_generator.state = snapshot.random_stream["air"]
-        self._noise[:] = np.asarray(snapshot.random_stream["drawn"])
+        self.flying.take(snapshot.state)
+        pilot, air = self.flying.streams
+        pilot.bit_generator.state = snapshot.random_stream["generator"]
+        air.bit_generator.state = snapshot.random_stream["air"]
         if self.laws is not None and snapshot.laws is not None:
             self.laws.restore(snapshot.laws)
-        observe(self.tables, self._state, self._scratch, self._row)
-        self._observed = True
+        self._observed = False
 
     def _observe(self) -> FloatArray:
         if not self._observed:
-            if self._noise_width:
-                self._noise[:] = self._random.standard_normal(self._noise_width)
-            observe(self.tables, self._state, self._scratch, self._row)
+            self.flying.do(OBSERVE)
             self._observed = True
         return self._row
+
+
+def sensors_of(values: FloatArray) -> Sensors:
+    """Sensor values as laws and pilots see them.
+
+    Args:
+        values: In the order of ``Sensors``, shape (SENSOR_COUNT,), booleans as numbers.
+    """
+    numbers: list[Any] = values.tolist()
+    numbers[-2:] = (numbers[-2] != 0.0, numbers[-1] != 0.0)  # the last two are booleans
+    return Sensors(*numbers)
+
+
+def fly_with_laws(flying: Flying, laws: LawChain, rows: FloatArray, frames: int, stages: int = WHOLE) -> int:
+    """Fly frames, asking laws in Python where they are due; in between their last decision is held in compiled code.
+
+    Args:
+        flying: The flight.
+        laws: The laws.
+        rows: Written: their rows, shape (frames, SIGNAL_COUNT).
+        frames: How many at most.
+        stages: Stages of the first frame.
+
+    Returns:
+        How many were flown.
+    """
+    state, scratch = flying.state, flying.scratch
+    flown = 0
+    while flown < frames and not flying.ended:
+        frame = int(state.clock[CLOCK.frame])
+        if laws.due(frame):
+            flying.do(stages & ~COMPLETE)
+            command = Command(*scratch.command[STATION.protected].tolist())
+            laws.decide(frame, sensors_of(scratch.sensors), command, Margins(*scratch.shown[1:].tolist()))
+            state.held[:] = laws.held
+            stages = COMPLETE
+        block = min(frames - flown, laws.every - frame % laws.every)
+        flown += flying.fly(rows[flown:], block, stages)
+        stages = WHOLE
+    return flown
+
+
+def _numbers(command: Command) -> tuple[float, float, float]:
+    """The channels of a command that came from outside."""
+    values = (float(command.stick), float(command.lever), float(command.nacelle_rate))
+    if not all(map(math.isfinite, values)):
+        raise InputError(
+            "the command is not a finite number",
+            key="command",
+            value=values,
+            mend="give stick, lever and nacelle rate as finite numbers",
+        )
+    return values

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.errors import InputError
+from rtsim.kernels.packed import packed
 from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.schedule_kernels import LpvTables
@@ -96,17 +97,19 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
         ],
         axis=-1,
     )
-    return LpvTables(
-        airspeed=database.airspeed,
-        nacelle=database.nacelle,
-        alpha=_layers_last(scheduling_alpha(database, x_ref)),
-        valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
-        cells=_layers_last(cells),
-        output_cells=_layers_last(output_cells),
-        rows=rows,
-        state_columns=state_columns,
-        input_columns=input_columns,
-        roles=roles,
+    return packed(
+        LpvTables(
+            airspeed=database.airspeed,
+            nacelle=database.nacelle,
+            alpha=_layers_last(scheduling_alpha(database, x_ref)),
+            valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
+            cells=_layers_last(cells),
+            output_cells=_layers_last(output_cells),
+            rows=rows,
+            state_columns=state_columns,
+            input_columns=input_columns,
+            roles=roles,
+        )
     )
 
 

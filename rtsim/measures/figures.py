@@ -9,7 +9,7 @@ import numpy as np
 
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
-from rtsim.loop.data import END_NONE
+from rtsim.loop.data import END
 from rtsim.measures import merit_kernels as places
 from rtsim.units import HORSEPOWER
 
@@ -148,7 +148,7 @@ def figures_from_sums(merit: FloatArray, dt: float) -> FlightFigures:
     if frames == 0:
         raise InputError("has no frames", key="flight")
     return FlightFigures(
-        completed=values[places.END_CODE] == END_NONE,
+        completed=values[places.END_CODE] == END.none,
         frames=frames,
         duration_s=frames * dt,
         flapping_integral_deg_s=values[places.FLAPPING_SUM] * dt,

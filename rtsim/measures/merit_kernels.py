@@ -7,18 +7,8 @@ a batch and the same path flown by ``rtsim fly`` give the same numbers bit for b
 from __future__ import annotations
 
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.kernels.compiled import batch_kernel, inner_kernel
-from rtsim.loop.advance_kernels import advance, pilot_command
-from rtsim.loop.data import (
-    CLOCK_END,
-    CLOCK_MODE,
-    END_NONE,
-    MODE_MOCM,
-    Scratch,
-    SimulationState,
-    SimulationTables,
-)
-from rtsim.loop.observe_kernels import observe
+from rtsim.kernels.compiled import inner_kernel, part
+from rtsim.loop.data import Flight
 from rtsim.units import STICK_HALF_TRAVEL_IN
 
 # Places of the sums and extremes in the array of one flight.
@@ -113,46 +103,19 @@ def merit_step(merit: FloatArray, row: FloatArray, dt: float) -> None:
     merit[FRAMES] += 1.0
 
 
-@batch_kernel
-def fly_measured(
-    tables: SimulationTables,
-    state: SimulationState,
-    scratch: Scratch,
-    noise: FloatArray,
-    air_noise: FloatArray,
-    row: FloatArray,
-    merit: FloatArray,
-) -> int:
-    """Fly frames as ``run_frames`` does, measuring instead of recording; runs outside Python's lock.
+@part
+def add_merit(flight: Flight) -> float:
+    """Add the frame that was flown to the sums and extremes in ``flight.measures``; a part of the frame.
 
     Args:
-        tables: The simulation.
-        state: Its state, updated in place.
-        scratch: Work space of this thread.
-        noise: Standard normals of the pilot, one row per frame; shape (frames, 0) where the noise is off.
-        air_noise: Standard normals of the air, one row per frame; shape (frames, 0) without turbulence.
-        row: Work space for one frame's row.
-        merit: Sums and extremes, updated in place, shape (MERIT_SIZE,).
-
-    Returns:
-        The number of frames flown.
+        flight: The flight.
     """
-    command = scratch.asked
-    for k in range(noise.shape[0]):
-        if state.clock[CLOCK_END] != END_NONE:
-            merit[END_CODE] = state.clock[CLOCK_END]
-            return k
-        observe(tables, state, scratch, row)
-        if state.clock[CLOCK_MODE] == MODE_MOCM:
-            pilot_command(tables, state, scratch, command)
-        advance(tables, state, scratch, row, (command, command, noise[k], air_noise[k]))
-        merit_step(merit, row, tables.dt)
-    merit[END_CODE] = state.clock[CLOCK_END]
-    return int(noise.shape[0])
+    merit_step(flight.measures, flight.scratch.row, flight.tables.dt)
+    return 0.0
 
 
-@batch_kernel
-def measure_rows(rows: FloatArray, dt: float, merit: FloatArray) -> None:
+@part
+def measure_rows(rows: FloatArray, dt: float, merit: FloatArray) -> float:
     """Measure a flight that was recorded.
 
     Args:
@@ -162,3 +125,4 @@ def measure_rows(rows: FloatArray, dt: float, merit: FloatArray) -> None:
     """
     for k in range(rows.shape[0]):
         merit_step(merit, rows[k], dt)
+    return 0.0

@@ -15,17 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.atmosphere.air import normals_needed
-from rtsim.frame import SIGNAL_COUNT
-from rtsim.loop.data import CLOCK_END, END_NONE, Scratch
-from rtsim.loop.setup import FlightSetup, Parts, build_parts, start_state
+from rtsim.loop.data import CLOCK
+from rtsim.loop.setup import FlightSetup, build_parts, prepare
 from rtsim.measures import merit_kernels as kernels
 from rtsim.measures.figures import FlightFigures, figures_from_sums
 from rtsim.programme import Programme
-from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
-
-CHUNK_FRAMES = 2_048
-"""Frames for which noise is drawn at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,27 +86,9 @@ class BatchFlyer:
         """
         seed = self.setup.options.seed if flight.seed is None else flight.seed
         setup = dataclasses.replace(self.setup.with_options(seed=seed), programme=flight.programme)
-        parts = self._own_parts(flight.programme)
-        pilot_random = stream_generator(seed, STREAM_PILOT)
-        air_random = stream_generator(seed, STREAM_TURBULENCE)
-        state = start_state(setup, parts, air_random.standard_normal(3))
-        dt = parts.tables.dt
+        merit = np.zeros(kernels.MERIT_SIZE)
+        flying = prepare(setup, measure=(kernels.add_merit, merit), unlocked=True)
         duration = flight.programme.duration if flight.duration is None else flight.duration
-        frames = max(1, math.ceil(duration * self.setup.options.rate_hz - 1e-6))
-        row, merit = np.zeros(SIGNAL_COUNT), np.zeros(kernels.MERIT_SIZE)
-        flown = 0
-        while flown < frames and state.clock[CLOCK_END] == END_NONE:
-            count = min(CHUNK_FRAMES, frames - flown)
-            noise = pilot_random.standard_normal((count, parts.noise_width))
-            air_noise = air_random.standard_normal((count, normals_needed(state.gusts)))
-            flown += kernels.fly_measured(parts.tables, state, parts.scratch, noise, air_noise, row, merit)
-        return figures_from_sums(merit, dt)
-
-    def _own_parts(self, programme: Programme) -> Parts:
-        """The shared parts with this flight's programme and its own work space."""
-        points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
-        return dataclasses.replace(
-            self._parts,
-            tables=self._parts.tables._replace(programme=points),
-            scratch=Scratch(*(np.zeros_like(array) for array in self._parts.scratch)),
-        )
+        flying.run(max(1, math.ceil(duration * self.setup.options.rate_hz - 1e-6)))
+        merit[kernels.END_CODE] = flying.state.clock[CLOCK.end]
+        return figures_from_sums(merit, flying.tables.dt)

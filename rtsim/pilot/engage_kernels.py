@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtsim.kernels.compiled import kernel
+from rtsim.kernels.compiled import allocating_kernel
 from rtsim.pilot.layout_kernels import (
     INTEGRALS,
     LOOP_INTEGRATORS,
@@ -41,7 +41,7 @@ from rtsim.pilot.layout_kernels import (
 )
 
 
-@kernel
+@allocating_kernel
 def mocm_engage(
     tables: PilotTables,
     state: FloatArray,
@@ -108,7 +108,7 @@ def mocm_engage(
     _start_integrals(tables, cell, state, trim, own[REF_AIRSPEED], errors)
 
 
-@kernel
+@allocating_kernel
 def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at: int, delay_at: int) -> None:
     """Put a delay filter at rest at the present hands: a x_d = -b u_p, by elimination."""
     delay = tables.roles[R_DELAY]
@@ -136,7 +136,7 @@ def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at:
         state[delay_at + k] = matrix[k, delay] / matrix[k, k]
 
 
-@kernel
+@allocating_kernel
 def _start_integrals(
     tables: PilotTables, cell: FloatArray, state: FloatArray, trim: FloatArray, airspeed: float, errors: FloatArray
 ) -> None:

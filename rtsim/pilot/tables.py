@@ -8,6 +8,7 @@ import numpy as np
 
 from rtsim.choices import OuterLoop
 from rtsim.errors import InputError
+from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.pilot import layout_kernels as kernels
 from rtsim.pilot.delay import delay_filter
@@ -79,25 +80,27 @@ def pack_pilot(database: Database, pilot: ScheduledPilot, *, dt: float) -> Pilot
     model = delay_filter(tau, order=order, kind="taylor" if kind == "taylor" else "pade")
     # the output is held over a frame and its inputs over another: half a frame each, so the true filter is shorter
     true = delay_filter(np.maximum(tau - dt, 0.1 * tau), order=order, kind="taylor" if kind == "taylor" else "pade")
-    return PilotTables(
-        airspeed=database.airspeed,
-        nacelle=database.nacelle,
-        trim=_trim_table(database, layout),
-        cells=cells,
-        a_columns=a_columns,
-        c_columns=c_columns,
-        lags=np.array([pilot.states.index(f"{n}_lag") if f"{n}_lag" in pilot.states else -1 for n in CONTROLS]),
-        model_delay_a=np.ascontiguousarray(model.A),
-        delay_b=np.ascontiguousarray(model.B),
-        model_delay_c=np.ascontiguousarray(model.C),
-        delay_d=np.ascontiguousarray(np.diag(model.D)),
-        output_delay_a=np.ascontiguousarray(true.A),
-        output_delay_c=np.ascontiguousarray(true.C),
-        limits=np.array(
-            [[-1.0, 0.0], [1.0, 1.0], [float(settings["stick_rate_limit"]), float(settings["lever_rate_limit"])]]
-        ),
-        numbers=_numbers(pilot, database, dt),
-        roles=roles,
+    return packed(
+        PilotTables(
+            airspeed=database.airspeed,
+            nacelle=database.nacelle,
+            trim=_trim_table(database, layout),
+            cells=cells,
+            a_columns=a_columns,
+            c_columns=c_columns,
+            lags=np.array([pilot.states.index(f"{n}_lag") if f"{n}_lag" in pilot.states else -1 for n in CONTROLS]),
+            model_delay_a=np.ascontiguousarray(model.A),
+            delay_b=np.ascontiguousarray(model.B),
+            model_delay_c=np.ascontiguousarray(model.C),
+            delay_d=np.ascontiguousarray(np.diag(model.D)),
+            output_delay_a=np.ascontiguousarray(true.A),
+            output_delay_c=np.ascontiguousarray(true.C),
+            limits=np.array(
+                [[-1.0, 0.0], [1.0, 1.0], [float(settings["stick_rate_limit"]), float(settings["lever_rate_limit"])]]
+            ),
+            numbers=_numbers(pilot, database, dt),
+            roles=roles,
+        )
     )
 
 

@@ -226,16 +226,10 @@ class LawChain:
             for channel, held in zip(CHANNELS, self._held, strict=True)
         )
 
-    def apply(self, command: Command) -> Command:
-        """Limit this frame's command by what was decided last.
-
-        Args:
-            command: The command before protection.
-        """
-        if self._held == [None, None, None]:
-            return command
-        held = zip(_values(command), self._held, strict=True)
-        return Command(*(before if after is None else after for before, after in held))
+    @property
+    def held(self) -> tuple[float, ...]:
+        """What was decided last: limited channels (NaN: the pilot's), and the reasons; ``rtsim.loop.data.HELD``."""
+        return (*(math.nan if value is None else value for value in self._held), *self.reasons)
 
     def unrepeatable(self) -> list[LawEvent]:
         """Make all calls again with fresh instances and name the laws that answer otherwise.

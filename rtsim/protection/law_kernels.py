@@ -118,17 +118,13 @@ def _finite(values: FloatArray) -> bool:
 
 
 @inner_kernel
-def law_decide(
+def _look_ahead(
     tables: ProtectionTables, state: FloatArray, sensors: FloatArray, command: FloatArray, work: FloatArray
-) -> None:
-    """Decide what is allowed until the next decision.
+) -> tuple[bool, tuple[float, float, float, float], tuple[float, float], tuple[float, float, float]]:
+    """Predict the flight with the controls as they are; ``work`` then holds the model and the roll-out.
 
-    Args:
-        tables: The law.
-        state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        sensors: What the law may know, shape (SENSOR_COUNT,).
-        command: Stick, lever, nacelle rate [rad/s] that would act without the law.
-        work: Scratch of WORK_SIZE numbers.
+    Returns:
+        Whether there is anything to decide on; the state z; stick and lever asked; the nacelles.
     """
     settings = tables.settings
     if not (_finite(sensors) and _finite(command)):
@@ -136,8 +132,8 @@ def law_decide(
         law_release(state)
         state[L_STARTED] = 0.0
         state[L_TIME], state[L_SIDE] = settings.warning_horizon, 0.0
-        return
-    cell, target = work[: model.CELL_SIZE], work[model.CELL_SIZE : 2 * model.CELL_SIZE]
+        return False, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)
+    cell = work[: model.CELL_SIZE]
     out = work[2 * model.CELL_SIZE : 2 * model.CELL_SIZE + model.ROLL_OUT_SIZE]
     dt = settings.period
     airspeed, angle, rate = sensors[SENSE_AIRSPEED], sensors[SENSE_NACELLE], sensors[SENSE_NACELLE_RATE]
@@ -172,17 +168,63 @@ def law_decide(
     state[L_TIME], state[L_SIDE] = out[model.OUT_TIME], out[model.OUT_SIDE]
     state[L_MARGIN] = min(out[model.OUT_LOW], out[model.OUT_HIGH])
     law_release_unblended(state)
+    return True, z, asked, nacelle
+
+
+@inner_kernel
+def _remember(state: FloatArray, sensors: FloatArray) -> None:
+    state[L_LAST_TORQUE] = sensors[SENSE_TORQUE]
+    state[L_STARTED] = 1.0
+
+
+@inner_kernel
+def law_watch(
+    tables: ProtectionTables, state: FloatArray, sensors: FloatArray, command: FloatArray, work: FloatArray
+) -> None:
+    """Look ahead and limit nothing: what the law ``monitor`` does.
+
+    Args:
+        tables: The law.
+        state: Law state, updated in place, shape (LAW_STATE_SIZE,).
+        sensors: What the law may know, shape (SENSOR_COUNT,).
+        command: Stick, lever, nacelle rate [rad/s] that would act without the law.
+        work: Scratch of WORK_SIZE numbers.
+    """
+    seen, _, _, _ = _look_ahead(tables, state, sensors, command, work)
+    if seen:
+        _remember(state, sensors)
+
+
+@inner_kernel
+def law_decide(
+    tables: ProtectionTables, state: FloatArray, sensors: FloatArray, command: FloatArray, work: FloatArray
+) -> None:
+    """Decide what is allowed until the next decision, by any of the laws.
+
+    Args:
+        tables: The law.
+        state: Law state, updated in place, shape (LAW_STATE_SIZE,).
+        sensors: What the law may know, shape (SENSOR_COUNT,).
+        command: Stick, lever, nacelle rate [rad/s] that would act without the law.
+        work: Scratch of WORK_SIZE numbers.
+    """
+    seen, z, asked, nacelle = _look_ahead(tables, state, sensors, command, work)
+    if not seen:
+        return
+    cell, target = work[: model.CELL_SIZE], work[model.CELL_SIZE : 2 * model.CELL_SIZE]
+    out = work[2 * model.CELL_SIZE : 2 * model.CELL_SIZE + model.ROLL_OUT_SIZE]
+    acting = (state[L_ACTED_STICK], state[L_ACTED_LEVER])
+    airspeed, angle, rate = sensors[SENSE_AIRSPEED], sensors[SENSE_NACELLE], sensors[SENSE_NACELLE_RATE]
     if tables.law == LAW_GOVERNOR:
         govern(tables, state, cell, z, (asked, asked), nacelle, command[2], out)
     elif tables.law == LAW_FULL:
         govern(tables, state, cell, z, (acting, asked), nacelle, command[2], out)
-        flight = (airspeed, angle, climb)
+        flight = (airspeed, angle, sensors[SENSE_CLIMB_RATE])
         scratch = (cell, target, out)
         blend_recovery(tables, state, scratch, z, asked, nacelle, command[2], flight, sensors[SENSE_ALTITUDE])
         limit_stick(tables, state, cell, z, acting, rate, sensors[SENSE_FLAPPING])
         limit_lever(tables, state, cell, sensors[SENSE_TORQUE], airspeed, angle)
-    state[L_LAST_TORQUE] = sensors[SENSE_TORQUE]
-    state[L_STARTED] = 1.0
+    _remember(state, sensors)
 
 
 @inner_kernel

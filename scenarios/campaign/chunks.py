@@ -19,7 +19,7 @@ from rtsim.protection.tables import LAW_NAMES
 from rtsim.units import kt
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.spec import CampaignFile, parse_campaign
-from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
+from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
 from scenarios.campaign.trial_kernels import METRIC_COUNT
 
 CHUNK_RUNS = 10
@@ -114,7 +114,7 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
         chunk: The piece.
     """
     spec = _spec(task.text, task.file)
-    bench = _bench(task.options)
+    bench = Bench()
     metrics = np.zeros((chunk.count, len(task.laws), METRIC_COUNT))
     seconds = np.zeros(len(task.laws))
     problems: list[tuple[int, int, str]] = []
@@ -147,7 +147,8 @@ def fly_law(
     if law.compiled:
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
-        return bench.fly(plan, _python_laws(law.name, folder, bench.corridor), repeat=repeat, keep=keep)
+        laws = _python_laws(law.name, folder, plan.setup.options.corridor or TRIAL_CORRIDOR)
+        return bench.fly(plan, laws, repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
@@ -182,11 +183,6 @@ def _spec(text: str, file: str) -> CampaignFile:
     if spec is None:
         raise problems[0]
     return spec
-
-
-@functools.lru_cache(maxsize=4)
-def _bench(options: FlightOptions) -> Bench:
-    return Bench(plant=options.plant, corridor=options.corridor_name, rate_hz=options.rate_hz)
 
 
 def present_folder() -> str:

@@ -14,6 +14,7 @@ from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
+from rtsim.loop.script import Pulse
 from rtsim.loop.setup import FlightSetup
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
@@ -22,7 +23,6 @@ from rtsim.units import deg, kt
 from scenarios.campaign.spec import CLASS_OPTIONS, CampaignFile, ClassTable, Generator, PulseDraw, draw
 from scenarios.campaign.trial import FlightPlan, has_trim
 from scenarios.files.loader import load_scenario
-from scenarios.files.script import Pulse
 
 ATTEMPTS = 200
 """Starts drawn before a class is said to have none inside the corridor."""
@@ -68,8 +68,10 @@ def draw_plan(
         start=start,
         air=AirSpecification(turbulence=turbulence, gusts=gusts),
         faults=faults,
+        pulses=pulses,
+        reaction=reaction if yields else None,
     )
-    return FlightPlan(setup=setup, duration=duration, pulses=pulses, reaction=reaction if yields else None)
+    return FlightPlan(setup, duration)
 
 
 def _options(item: ClassTable, generator: Generator) -> dict[str, Any]:

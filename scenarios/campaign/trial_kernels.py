@@ -1,35 +1,16 @@
-"""One trial flight in one compiled call: aircraft, pilot, script and protection law, and what it is judged by.
-
-The frame is that of ``rtsim.loop.advance_kernels``; between the pilot and the aircraft stands the script.
-"""
+"""What a trial flight is judged by, measured from its rows."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from rtsim.aircraft.variables import INPUT
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.kernels.compiled import inner_kernel
-from rtsim.loop.advance_kernels import advance, pilot_command
-from rtsim.loop.data import (
-    CLOCK_END,
-    CLOCK_FRAME,
-    CLOCK_MODE,
-    END_NONE,
-    MODE_MOCM,
-    Scratch,
-    SimulationState,
-    SimulationTables,
-)
-from rtsim.loop.observe_kernels import observe
 from rtsim.protection import law_data as law
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.units import DEGREE, INCH_POUND, KNOT
-from scenarios.files.script_kernels import script_command, script_notice
 
-WARNING_MARGIN = 4.0
-"""Corridor margin at which the monitor warns and a pilot who yields begins to react [kn]."""
 OUTSIDE_MARGIN, PERSISTENCE, MERGE = -0.5, 0.1, 0.5
 """An exceedance: margin below this [kn], for this long [s]; events closer than the last are one [s]."""
 ARRIVED_AIRSPEED, ARRIVED_NACELLE = 1.0, 0.5
@@ -56,98 +37,6 @@ class TrialLimits(NamedTuple):
     """Mast torque."""
     torque_excess: float
     """Share of the torque limit that counts as over it [-]."""
-
-
-@inner_kernel
-def ask_pilot(
-    tables: SimulationTables,
-    state: SimulationState,
-    scratch: Scratch,
-    row: FloatArray,
-    script: tuple[FloatArray, FloatArray],
-    command: FloatArray,
-) -> None:
-    """Observe, and give the command of pilot and script for the frame.
-
-    Args:
-        tables: The simulation.
-        state: Its state.
-        scratch: Its work space.
-        row: The frame's row, filled.
-        script: Pulses and script state.
-        command: Written: stick, lever, nacelle rate [rad/s].
-    """
-    observe(tables, state, scratch, row)
-    if state.clock[CLOCK_MODE] == MODE_MOCM:
-        pilot_command(tables, state, scratch, command)
-    else:
-        command[0] = state.u[INPUT.stick]
-        command[1] = state.u[INPUT.lever]
-        command[2] = 0.0
-    script_command(script[0], script[1], row[COLUMN.time_s], command)
-
-
-@inner_kernel
-def take_notice(
-    tables: SimulationTables,
-    state: SimulationState,
-    scratch: Scratch,
-    row: FloatArray,
-    script: tuple[FloatArray, FloatArray],
-    reaction: float,
-) -> None:
-    """Let a pilot who yields take notice of what he was shown and felt in the frame that is over.
-
-    Args:
-        tables: The simulation.
-        state: Its state at the start of the next frame.
-        scratch: Its work space as the frame left it.
-        row: The row of the frame that is over.
-        script: Pulses and script state.
-        reaction: Reaction time of a pilot who yields [s], negative for one who does not.
-    """
-    if reaction < 0.0:
-        return
-    warned = min(scratch.shown[1], scratch.shown[2]) < WARNING_MARGIN * KNOT
-    warned = warned or row[COLUMN.protection_stick_reason] != 0.0
-    warned = warned or row[COLUMN.protection_lever_reason] != 0.0
-    warned = warned or row[COLUMN.protection_nacelle_reason] != 0.0
-    time = state.clock[CLOCK_FRAME] * tables.dt
-    script_notice(script[1], reaction, time, warned, scratch.shown[0], state.reference)
-
-
-@inner_kernel
-def fly_trial(
-    tables: SimulationTables,
-    state: SimulationState,
-    scratch: Scratch,
-    script: tuple[FloatArray, FloatArray],
-    reaction: float,
-    noise: tuple[FloatArray, FloatArray],
-    rows: FloatArray,
-) -> int:
-    """Fly until the rows are full or the flight ends.
-
-    Args:
-        tables: The simulation, its law included.
-        state: Simulation state, updated in place.
-        scratch: Work space of the simulation.
-        script: Pulses and script state.
-        reaction: Reaction time of a pilot who yields [s], negative for one who does not.
-        noise: Standard normals of pilot and air, one row per frame.
-        rows: Written: frame rows.
-
-    Returns:
-        Frames flown.
-    """
-    command = scratch.asked
-    for k in range(rows.shape[0]):
-        if state.clock[CLOCK_END] != END_NONE:
-            return k
-        ask_pilot(tables, state, scratch, rows[k], script, command)
-        advance(tables, state, scratch, rows[k], (command, command, noise[0][k], noise[1][k]))
-        take_notice(tables, state, scratch, rows[k], script, reaction)
-    return rows.shape[0]
 
 
 @inner_kernel

@@ -10,10 +10,10 @@ from rtsim.atmosphere import AirSpecification
 from rtsim.choices import PilotMode
 from rtsim.faults import Fault
 from rtsim.loop.options import FlightOptions
+from rtsim.loop.script import Pulse
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
 from scenarios.files.nacelle_laws import AutomaticSettings
-from scenarios.files.script import Pulse
 from scenarios.files.trial import Trial
 
 START_CONDITIONS: dict[str, tuple[float, float]] = {

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from rtsim.errors import InputError
+from rtsim.loop.script import Pulse
 from rtsim.plugins import suggestion
 from rtsim.units import deg
-from scenarios.files.script import Pulse
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
 TrialKind = Literal["nominal", "misuse", "failure", "unprotectable"]

@@ -42,6 +42,7 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         start=scenario.start,
         air=scenario.air,
         faults=scenario.faults,
+        pulses=scenario.pulses,
         automatic_nacelle=automatic_nacelle(scenario.options.nacelle, scenario.automatic, scenario.programme),
     )
 

@@ -29,7 +29,6 @@ from scenarios.flight.mavlink_options import MavlinkOptions, flown_by_hand, mavl
 from scenarios.flight.pilots import load_pilot
 from scenarios.flight.preflight import preflight_problems
 from scenarios.flight.result import FlightRecord, judge
-from scenarios.flight.script_hands import ScriptHands
 from scenarios.flight.session import FlightSession
 from scenarios.flight.sinks import FlightSinks
 from telemetry.log.format import FlightMetadata, LogEvent
@@ -125,7 +124,6 @@ def fly(
             pilot_name=scenario.options.pilot,
             hands=hands,
             nacelle_law=nacelle_law,
-            script=ScriptHands(scenario.pulses) if scenario.pulses else None,
         )
         log = _start_log(scenario, simulation, outputs, live=live)
         sinks = FlightSinks(

@@ -14,7 +14,7 @@ from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults import fault_events
 from rtsim.frame import SIGNAL_COUNT, FloatArray
-from rtsim.loop.data import END_GENTLE_LANDING
+from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.protection.chain import LawEvent
 from rtsim.units import to_deg
@@ -23,7 +23,6 @@ from scenarios.files.nacelle_laws import NacelleLawFactory, NacelleLawGuard
 from scenarios.files.scenario import ScenarioEvent
 from scenarios.flight.hands import Hands, pilot_modes
 from scenarios.flight.pilots import PilotFactory
-from scenarios.flight.script_hands import ScriptHands
 from telemetry.log.format import LogEvent
 
 PILOT_WORDS: dict[PilotMode, str] = {
@@ -34,7 +33,7 @@ PILOT_WORDS: dict[PilotMode, str] = {
 """What a hand-over to each mode means, for people."""
 HAND_WORDS = "your sticks fly"
 """The same for the mode ``external`` where a person holds the sticks."""
-GENTLE_END = END_REASONS[END_GENTLE_LANDING].split(",", maxsplit=1)[0]
+GENTLE_END = END_REASONS[END.gentle_landing].split(",", maxsplit=1)[0]
 """How the end reason of a gentle landing begins."""
 
 
@@ -54,7 +53,6 @@ class FlightSession:
         pilot_factory: PilotFactory | None = None,
         pilot_name: str = "mocm",
         hands: Hands | None = None,
-        script: ScriptHands | None = None,
         nacelle_law: NacelleLawFactory | None = None,
     ) -> None:
         """Prepare a flight from the simulation's present state, which must be frame 0.
@@ -66,7 +64,6 @@ class FlightSession:
             pilot_factory: Makes the pilot plug-in; None where the built-in pilot flies alone.
             pilot_name: How the pilot is called in messages.
             hands: A person who may fly by MAVLink; None where there is no MAVLink.
-            script: What a script does to the built-in pilot's commands; None where there is none.
             nacelle_law: Makes the law that sets the nacelle rate; None where pilot or built-in law do.
         """
         self.simulation = simulation
@@ -85,7 +82,6 @@ class FlightSession:
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name
         self._pilot: Pilot | None = pilot_factory() if pilot_factory is not None else None
         self._hands = hands
-        self._script = script
         self._nacelle_law = NacelleLawGuard(nacelle_law) if nacelle_law is not None else None
         self._failure = ""
         self._in_block: tuple[int, int] | None = None
@@ -127,18 +123,16 @@ class FlightSession:
         if self._next_failure < len(self._failures):
             self._tell_failures()
         simulation = self.simulation
-        command = None
+        command, scripted = None, False
         hands = self._hands
         if hands is not None:
             command = hands.before(self)
         elif self._pilot is not None and simulation.mode == "external":
             command = self._ask_pilot(self._pilot)
-        elif self._script is not None and simulation.mode == "mocm":
-            command = self._script.command(simulation)
+            scripted = True
         if self._nacelle_law is not None and simulation.mode != "hold":
             command = self._tilt(self._nacelle_law, command)
-        # A run of one frame is the same frame as a step, in one call of compiled code instead of three.
-        row: FloatArray = simulation.run(1)[0] if command is None else simulation.step(command)
+        row = simulation.step(command, scripted=scripted)
         self.rows += 1
         if hands is not None:
             hands.after(row, simulation.dt)
@@ -162,9 +156,8 @@ class FlightSession:
             self._tell_failures()
         if self._next_failure < len(self._failures):
             frames = min(frames, self._failures[self._next_failure][0] - self.simulation.frame_index)
-        scripted = self._script is not None and self.simulation.mode == "mocm"
         by_code = self._hands is not None or self._nacelle_law is not None
-        if not by_code and not scripted and (self._pilot is None or self.simulation.mode != "external"):
+        if not by_code and (self._pilot is None or self.simulation.mode != "external"):
             self._in_block = (self.rows, self.simulation.frame_index)
             rows = self.simulation.run(frames)
             self._in_block = None
@@ -186,8 +179,6 @@ class FlightSession:
             self._pilot = self._pilot_factory()
         if self._hands is not None:
             self._hands.reset(self.simulation)
-        if self._script is not None:
-            self._script.reset()
         if self._nacelle_law is not None:
             self._nacelle_law.reset()
 

@@ -6,23 +6,16 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from rtsim.atmosphere import AirSpecification, Turbulence
-from rtsim.atmosphere.air import normals_needed
 from rtsim.choices import OuterLoop, PlantName
-from rtsim.frame import SIGNAL_COUNT, SIGNAL_NAMES, FloatArray
-from rtsim.loop.advance_kernels import run_frames
-from rtsim.loop.data import CLOCK_END, CLOCK_SINK
-from rtsim.loop.options import FlightOptions
-from rtsim.loop.setup import FlightSetup, build_parts, start_state
-from rtsim.loop.simulation import END_REASONS
+from rtsim.frame import SIGNAL_NAMES, FloatArray
+from rtsim.loop.setup import FlightSetup, build_parts
+from rtsim.loop.simulation import Simulation
 from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
 from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
 from rtsim.pilot.layout_kernels import PilotTables
 from rtsim.pilot.weights import PilotSettings
 from rtsim.programme import Programme
-from rtsim.random_streams import STREAM_TURBULENCE, stream_generator
 
 RATE_HZ = 250
 """Frames per second of every flight."""
@@ -134,30 +127,15 @@ class Flyer:
         air = AirSpecification()
         if variant.turbulence:
             air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=variant.turbulence))
-        setup = FlightSetup(
-            programme=programme,
-            options=FlightOptions(
-                plant=variant.plant,
-                outer_loop=variant.outer_loop,
-                protection="off",
-                rate_hz=RATE_HZ,
-                seed=variant.seed,
-            ),
-            air=air,
+        setup = FlightSetup(programme=programme, air=air).with_options(
+            plant=variant.plant, outer_loop=variant.outer_loop, rate_hz=RATE_HZ, seed=variant.seed
         )
         parts = build_parts(setup)
         if self._pilot is not None:
             parts = dataclasses.replace(parts, tables=parts.tables._replace(pilot=self._pilot))
-        # The same stream and order as rtsim.loop.simulation: such a flight has the same history to the last bit.
-        random = stream_generator(variant.seed, STREAM_TURBULENCE)
-        state = start_state(setup, parts, random.standard_normal(3))
-        frames = max(1, math.ceil(programme.duration * RATE_HZ - 1e-6))
-        rows = np.zeros((frames, SIGNAL_COUNT))
-        noise = np.zeros((frames, 0))
-        air_noise = random.standard_normal((frames, normals_needed(state.gusts)))
-        flown = int(run_frames(parts.tables, state, parts.scratch, noise, air_noise, rows))
-        reason = END_REASONS[int(state.clock[CLOCK_END])].format(sink=float(state.clock[CLOCK_SINK]))
-        return Flight(name, programme, rows[:flown], reason)
+        simulation = Simulation(setup, parts=parts)
+        rows = simulation.run(max(1, math.ceil(programme.duration * RATE_HZ - 1e-6)))
+        return Flight(name, programme, rows, simulation.end_reason)
 
 
 def _designed_pilot(variant: Variant, jobs: int) -> PilotTables:

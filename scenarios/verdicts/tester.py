@@ -9,20 +9,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rtsim.choices import HAND_PILOT, CorridorName
+from rtsim.choices import HAND_PILOT
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from rtsim.loop.options import FlightOptions
 from rtsim.measures.metrics import flight_metrics
 from rtsim.measures.trial_metrics import TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
-from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
+from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
 from scenarios.files.scenario import Expectation, Scenario
 from scenarios.files.trial import Trial
 from scenarios.flight.flight_setup import flight_setup
 from scenarios.verdicts.events import new_violations
 
-TEST_CORRIDOR: CorridorName = "flight"
-"""Corridor of scenarios that name none."""
 LAW_CLAUSE = "law"
 """Metric of the clause that the law runs without failing."""
 
@@ -158,7 +156,7 @@ class Tester:
         FlightOptions().changed(options)
         self._law, self._options = law, options
         self._folder = present_folder()
-        self._benches: dict[tuple[str, str, int], Bench] = {}
+        self._bench = Bench()
         if law is not None:
             law_chain(law, self._folder)
 
@@ -181,11 +179,7 @@ class Tester:
         begin = time.perf_counter()
         law = self._law or trial.law
         law_chain(law, self._folder)
-        options = scenario.options
-        key = (options.plant, options.corridor_name, options.rate_hz)
-        if key not in self._benches:
-            self._benches[key] = Bench(plant=options.plant, corridor=options.corridor_name, rate_hz=options.rate_hz)
-        bench = self._benches[key]
+        bench = self._bench
         plan = plan_of(scenario)
         off = bench.fly(plan, "off", keep=True)
         flown = fly_law(bench, plan, LawVariant(law), folder=self._folder, repeat=True, keep=True)
@@ -241,12 +235,12 @@ def plan_of(scenario: Scenario) -> FlightPlan:
     Args:
         scenario: The scenario.
     """
-    return FlightPlan(setup=flight_setup(scenario), duration=scenario.duration, pulses=scenario.pulses)
+    return FlightPlan(flight_setup(scenario), scenario.duration)
 
 
 def _judged(scenario: Scenario) -> Scenario:
     """The scenario in the corridor that tests judge by."""
-    return scenario.with_options(corridor=scenario.options.corridor or TEST_CORRIDOR)
+    return scenario.with_options(corridor=scenario.options.corridor or TRIAL_CORRIDOR)
 
 
 def is_test(scenario: Scenario) -> bool:

@@ -245,7 +245,7 @@ def test_no_flight_begins_without_governor_or_flaps_because_of_a_file(tmp_path):
 
 def test_flap_speed_limits_are_those_of_the_aircrafts_data():
     """Telemetry reads no aircraft data; its table must say the same (NASA TM X-62407, TM 81244)."""
-    file = resources.files("rtsim.aircraft").joinpath("data", "xv15_inputs.toml")
+    file = resources.files("rtsim.aircraft.xv15").joinpath("data", "xv15_inputs.toml")
     data = tomllib.loads(file.read_text(encoding="utf-8"))["controls"]
     assert list(FLAP_SPEEDS) == list(zip(data["flap_settings_deg"], data["flap_speed_limits_kt"], strict=True))
 

@@ -14,6 +14,7 @@ from rtsim.aircraft.variables import OUTPUTS, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.data_reader import load_tables
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.kernels.packed import packed
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,4 +112,4 @@ class Xv15:
 
 @cache
 def _cached_tables() -> AircraftTables:
-    return load_tables()
+    return packed(load_tables())

@@ -8,9 +8,14 @@ from __future__ import annotations
 
 import math
 
-from rtsim.frame import FloatArray
-from rtsim.kernels.compiled import inner_kernel
+import numpy as np
 
+from rtsim.frame import COLUMN, FloatArray
+from rtsim.kernels.compiled import inner_kernel
+from rtsim.units import KNOT
+
+WARNING_MARGIN = 4.0 * KNOT
+"""Corridor margin at which the monitor warns and a pilot who yields begins to react [m/s]."""
 CHANNEL_STICK, CHANNEL_LEVER, CHANNEL_SWITCH = 0, 1, 2
 SHAPE_STEP, SHAPE_DOUBLET, SHAPE_SINE = 0, 1, 2
 
@@ -23,17 +28,15 @@ S_WARNED_SINCE, S_YIELDED, S_SWITCHED, S_HELD_AIRSPEED = 0, 1, 2, 3
 """Time since when there is a warning [s] (negative: none); 1 after yielding; 1 after the first use of the switch;
 airspeed held after yielding [m/s]."""
 SCRIPT_STATE_SIZE = 4
+PULSE_SIZE = 7
+"""Numbers of a pulse."""
 
 
-@inner_kernel
-def script_start(state: FloatArray) -> None:
-    """Set the state to that before the first frame.
-
-    Args:
-        state: Script state, overwritten, shape (SCRIPT_STATE_SIZE,).
-    """
-    state[:] = 0.0
+def new_script_state() -> FloatArray:
+    """Give the script's state before the first frame, shape (SCRIPT_STATE_SIZE,)."""
+    state = np.zeros(SCRIPT_STATE_SIZE)
     state[S_WARNED_SINCE] = -1.0
+    return state
 
 
 @inner_kernel
@@ -74,6 +77,20 @@ def script_command(pulses: FloatArray, state: FloatArray, time: float, command: 
     command[1] = min(max(command[1], 0.0), 1.0)
     if state[S_SWITCHED] != 0.0:
         command[2] = pressed
+
+
+@inner_kernel
+def warns(shown: FloatArray, row: FloatArray) -> bool:
+    """Whether a pilot is warned: the margin shown is small, or the protection acts.
+
+    Args:
+        shown: What the airspeed indicator shows, then the margins that go with it [m/s].
+        row: The frame's row.
+    """
+    warned = min(shown[1], shown[2]) < WARNING_MARGIN
+    warned = warned or row[COLUMN.protection_stick_reason] != 0.0
+    warned = warned or row[COLUMN.protection_lever_reason] != 0.0
+    return warned or row[COLUMN.protection_nacelle_reason] != 0.0
 
 
 @inner_kernel

@@ -13,9 +13,9 @@ from rtsim.frame import FloatArray  # of arrays, without compiled code: reading 
 Channel = Literal["stick", "lever", "switch"]
 Shape = Literal["step", "doublet", "sine"]
 CHANNELS: dict[Channel, int] = {"stick": 0, "lever": 1, "switch": 2}
-"""Channels by name, with their number in ``scenarios.files.script_kernels``."""
+"""Channels by name, with their number in ``rtsim.loop.script_kernels``."""
 SHAPES: dict[Shape, int] = {"step": 0, "doublet": 1, "sine": 2}
-"""Shapes of pulses by name, with their number in ``scenarios.files.script_kernels``."""
+"""Shapes of pulses by name, with their number in ``rtsim.loop.script_kernels``."""
 PULSE_SIZE = 7
 """Numbers of a pulse in the kernels' table."""
 

@@ -1,0 +1,259 @@
+"""A flight that is about to be flown or on its way: its tables, state, work space and random streams, and one ``fly``.
+
+Whoever flies, flies this: ``Simulation`` frame by frame or in blocks, trials, searches and studies whole. A part of the
+frame that the flight needs is compiled when it is first needed, before the frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from rtsim.atmosphere.air import normals_needed
+from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.kernels.packed import Packed, packed
+from rtsim.kernels.parts import address_of, entry_point
+from rtsim.loop import frame_kernels as frames_of
+from rtsim.loop import part_kernels as parts
+from rtsim.loop import plant_kernels as plants
+from rtsim.loop.data import (
+    CLOCK,
+    END,
+    END_REASONS,
+    PART,
+    Flight,
+    Scratch,
+    SimulationState,
+    SimulationTables,
+)
+from rtsim.protection.law_data import LAW_MONITOR
+from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
+
+WHOLE, COMPLETE = frames_of.WHOLE, frames_of.COMPLETE
+NO_ROWS = np.zeros((0, SIGNAL_COUNT))
+_NO_NORMALS = np.zeros((1, 0))
+_STILL = np.zeros((1, 3))
+"""Normals of the air where no time passes."""
+_ADDRESSES: dict[tuple[str, Any], int] = {}
+"""Addresses of compiled parts by name and the types they were compiled for."""
+BLOCK = 2_048
+"""Frames for which noise is drawn at a time in a flight that keeps no rows."""
+Streams = tuple[np.random.Generator, np.random.Generator]
+Measure = Callable[[Any], float]
+"""A compiled part that looks at ``flight.scratch.row`` after each frame and adds to ``flight.measures``."""
+
+
+def new_streams(seed: int) -> Streams:
+    """Random streams of the pilot's noise and of the turbulence.
+
+    Args:
+        seed: Root of every random stream.
+    """
+    return stream_generator(seed, STREAM_PILOT), stream_generator(seed, STREAM_TURBULENCE)
+
+
+class Flying:
+    """One flight."""
+
+    __slots__ = ("_entry", "_nonlinear", "_unlocked", "flight", "noise_width", "state", "streams")
+
+    def __init__(
+        self,
+        tables: SimulationTables,
+        state: SimulationState,
+        scratch: Scratch,
+        *,
+        streams: Streams,
+        nonlinear: bool,
+        noise_width: int,
+        measure: tuple[Measure, FloatArray] | None = None,
+        unlocked: bool = False,
+    ) -> None:
+        """Put a flight together; nothing is flown yet.
+
+        Args:
+            tables: What the frame reads.
+            state: The state, changed by flying.
+            scratch: Work space of this flight alone.
+            streams: Random streams of the pilot's noise and of the turbulence.
+            nonlinear: The nonlinear aircraft flies.
+            noise_width: Standard normals that the pilot takes per frame; 0: no noise.
+            measure: A part that measures each frame, and the array that it adds to.
+            unlocked: Fly outside Python's lock: in batches, where threads fly side by side.
+        """
+        sums = np.zeros(0) if measure is None else measure[1]
+        addresses = np.zeros(PART.size, dtype=np.int64)
+        self.flight: Any = packed(Flight(tables, state, scratch, sums, addresses))
+        """The flight as kernels see it."""
+        self.state: SimulationState = self.flight.state
+        """Its state."""
+        self.streams = streams
+        """Random streams of the pilot's noise and of the turbulence."""
+        self.noise_width, self._nonlinear = noise_width, nonlinear
+        for name in ("outputs", "step", "ask", "advance", "engage"):
+            self._load(name)
+        if tables.automatic.active:
+            self._load("automatic_rate")
+            self._load("automatic_advance")
+        if tables.script.pulses.shape[0] or tables.script.reaction >= 0.0:
+            self._load("script")
+        if tables.script.reaction >= 0.0:
+            self._load("notice")
+        if measure is not None:
+            addresses[PART.measure] = _address(measure[0], self.flight)
+        arguments = (self.flight, NO_ROWS, _NO_NORMALS, _NO_NORMALS, 0, 0)
+        self._entry = _entry(frames_of.fly_frames, arguments)
+        self._unlocked: tuple[Any, int] | None = None
+        if unlocked:
+            address = _address(frames_of.fly_frames, *arguments)
+            self._unlocked = (_entry(frames_of.fly_unlocked, (address, *arguments)), address)
+
+    @property
+    def tables(self) -> SimulationTables:
+        """What the frame reads."""
+        return self.flight.tables  # type: ignore[no-any-return]
+
+    @property
+    def scratch(self) -> Scratch:
+        """Its work space; the row of the present frame is ``scratch.row``."""
+        return self.flight.scratch  # type: ignore[no-any-return]
+
+    @property
+    def ended(self) -> bool:
+        """The flight ended by itself."""
+        return bool(self.state.clock[CLOCK.end] != END.none)
+
+    @property
+    def end_reason(self) -> str:
+        """Why; empty while it has not."""
+        clock = self.state.clock
+        return END_REASONS[int(clock[CLOCK.end])].format(sink=float(clock[CLOCK.sink]))
+
+    def fly(self, rows: FloatArray, frames: int, stages: int = WHOLE) -> int:
+        """Fly frames.
+
+        Args:
+            rows: Written: their rows, shape (frames, SIGNAL_COUNT); ``NO_ROWS`` keeps none.
+            frames: How many at most.
+            stages: Stages of the first frame.
+
+        Returns:
+            How many were flown: fewer where the flight ended by itself.
+        """
+        noise = air = _NO_NORMALS
+        if stages & COMPLETE or frames > 1:
+            if self.noise_width:
+                noise = self.streams[0].standard_normal((frames, self.noise_width))
+            width = normals_needed(self.state.gusts)
+            if width:
+                air = self.streams[1].standard_normal((frames, width))
+        flown = self._call(rows, noise, air, frames, stages)
+        while self.state.clock[CLOCK.missing] != 0.0:
+            self._load_missing()
+            left = noise[flown:] if noise.shape[1] else noise, air[flown:] if air.shape[1] else air
+            flown += self._call(rows[flown:], *left, frames - flown, WHOLE if flown else stages)
+        return flown
+
+    def run(self, frames: int) -> int:
+        """Fly frames without keeping their rows, for measures.
+
+        Args:
+            frames: How many at most.
+
+        Returns:
+            How many were flown.
+        """
+        flown = 0
+        while flown < frames and not self.ended:
+            flown += self.fly(NO_ROWS, min(BLOCK, frames - flown))
+        return flown
+
+    def do(self, stages: int) -> None:
+        """Do stages of the present frame that draw no random numbers.
+
+        Args:
+            stages: Which.
+        """
+        self._call(NO_ROWS, _NO_NORMALS, _STILL, 1, stages)
+        while self.state.clock[CLOCK.missing] != 0.0:
+            self._load_missing()
+            self._call(NO_ROWS, _NO_NORMALS, _STILL, 1, stages)
+
+    def take(self, state: SimulationState) -> None:
+        """Take another state.
+
+        Args:
+            state: Arrays as those of the present one.
+        """
+        for mine, start in zip(self.state, state, strict=True):
+            mine[:] = start
+
+    def _call(self, rows: FloatArray, noise: FloatArray, air: FloatArray, frames: int, stages: int) -> int:
+        if self._unlocked is not None:
+            entry, address = self._unlocked
+            return int(entry(address, self.flight, rows, noise, air, frames, stages))
+        return int(self._entry(self.flight, rows, noise, air, frames, stages))
+
+    def _load_missing(self) -> None:
+        name = next(name for name, place in PART.asdict().items() if place == int(self.state.clock[CLOCK.missing]) - 1)
+        for one in ("faults", "fail") if name == "faults" else (name,):
+            self._load(one)
+
+    def _load(self, name: str) -> None:
+        """Compile a part or load it, and note its address."""
+        flight, scratch, state = self.flight, self.scratch, self.state
+        aircraft = flight.tables.plant.aircraft.target
+        if name == "outputs":
+            kernel: Any = plants.outputs_of_nonlinear if self._nonlinear else plants.outputs_of_lpv
+            arguments: tuple[Any, ...] = (aircraft, state.x, state.u, 0.0, scratch.y, scratch.xdot, scratch.work)
+        elif name == "step":
+            kernel = plants.step_of_nonlinear if self._nonlinear else plants.step_of_lpv
+            arguments = (aircraft, state.x, state.u, scratch.path, 0.0, scratch.work)
+        elif name == "decide":
+            # The monitor flies with most flights: it is compiled without what the other laws need.
+            watches = flight.tables.protection.law == LAW_MONITOR
+            kernel, arguments = (parts.watch_law if watches else parts.decide_law), (flight,)
+        else:
+            kernel, arguments = _PARTS[name], (flight, *_MORE.get(name, ()))
+        flight.parts[getattr(PART, name)] = _address(kernel, *arguments)
+
+
+_PARTS: dict[str, Any] = {
+    "ask": parts.ask_mocm,
+    "advance": parts.advance_mocm,
+    "engage": parts.engage_mocm,
+    "aids": parts.act_aids,
+    "air": parts.move_air,
+    "faults": parts.schedule_faults,
+    "fail": parts.fail_actuators,
+    "automatic_rate": parts.rate_of_automatic_nacelle,
+    "automatic_advance": parts.advance_automatic_nacelle,
+    "script": parts.act_script,
+    "notice": parts.notice_warning,
+}
+_MORE: dict[str, tuple[Any, ...]] = {"advance": (np.zeros(0),), "air": (0.0, np.zeros(0))}
+"""Arguments that a part takes besides the flight."""
+
+
+def _key(kernel: Any, arguments: tuple[Any, ...]) -> tuple[str, Any]:
+    types = tuple(one._kind if isinstance(one, Packed) else type(one) for one in arguments)
+    return kernel.__qualname__, types
+
+
+def _address(kernel: Any, *arguments: Any) -> int:
+    key = _key(kernel, arguments)
+    if key not in _ADDRESSES:
+        _ADDRESSES[key] = address_of(kernel, *arguments)
+    return _ADDRESSES[key]
+
+
+_ENTRIES: dict[tuple[str, Any], Any] = {}
+
+
+def _entry(kernel: Any, arguments: tuple[Any, ...]) -> Any:
+    key = _key(kernel, arguments)
+    if key not in _ENTRIES:
+        _ENTRIES[key] = entry_point(kernel, *arguments)
+    return _ENTRIES[key]

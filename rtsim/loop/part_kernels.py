@@ -1,0 +1,223 @@
+"""The parts of a frame that are compiled on their own (``rtsim.loop.data.PART``), each for where it flies."""
+
+from __future__ import annotations
+
+import math
+
+from rtsim.aids.aids_kernels import GOVERNOR, aids_airspeed, aids_step
+from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
+from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
+from rtsim.atmosphere.gust_kernels import G_AHEAD, gust_step
+from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
+from rtsim.frame import FloatArray
+from rtsim.kernels.compiled import kernel, part
+from rtsim.loop import script_kernels as script
+from rtsim.loop.data import CHANNEL, CLOCK, MOTION, STATION, TARGET, Flight
+from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
+from rtsim.pilot.engage_kernels import mocm_engage
+from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
+from rtsim.protection.law_kernels import law_decide, law_watch
+from rtsim.systems.drive_kernels import DEVIATION, governor_power
+from rtsim.systems.flap_kernels import flap_now, flap_parts
+
+
+@part
+def ask_mocm(flight: Flight) -> float:
+    """The MOCM's command as the station ``pilot``; changes no state.
+
+    Args:
+        flight: The flight as ``observe`` left it.
+    """
+    scratch = flight.scratch
+    command = scratch.command[STATION.pilot]
+    angle = scratch.motion[MOTION.angle]
+    mocm_output_in(flight.tables.pilot, flight.state.pilot, angle, scratch.target, command, scratch.pilot)
+    command[CHANNEL.nacelle_rate] = scratch.target[TARGET.nacelle_rate]
+    return 0.0
+
+
+@part
+def advance_mocm(flight: Flight, normals: FloatArray) -> float:
+    """Move the MOCM to the next frame.
+
+    Args:
+        flight: The flight with its command at all stations.
+        normals: Standard normals of its noise; none: no noise.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    scalars = (scratch.motion[MOTION.angle], scratch.motion[MOTION.rate], tables.dt)
+    acting = scratch.command[STATION.protected]
+    mocm_advance_in(tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, normals, scratch.pilot)
+    return 0.0
+
+
+@kernel
+def engage_mocm(flight: Flight) -> float:
+    """Let the MOCM take the controls as they are: its state is set so that its first output equals them.
+
+    Args:
+        flight: The flight as ``observe`` left it.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    acting = scratch.command[STATION.acting]
+    acting[CHANNEL.stick], acting[CHANNEL.lever] = state.u[INPUT.stick], state.u[INPUT.lever]
+    angle, rate = scratch.motion[MOTION.angle], scratch.motion[MOTION.rate]
+    mocm_engage(tables.pilot, state.pilot, scratch.seen, angle, rate, scratch.target, acting)
+    return 0.0
+
+
+@part
+def watch_law(flight: Flight) -> float:
+    """Decide as the law ``monitor`` does: look ahead and limit nothing.
+
+    Args:
+        flight: The flight with its sensors.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    law_watch(tables.protection, state.protection, scratch.sensors, scratch.command[STATION.aided], scratch.law)
+    return 0.0
+
+
+@part
+def decide_law(flight: Flight) -> float:
+    """Decide as the law of the flight does.
+
+    Args:
+        flight: The flight with its sensors.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    law_decide(tables.protection, state.protection, scratch.sensors, scratch.command[STATION.aided], scratch.law)
+    return 0.0
+
+
+@part
+def act_aids(flight: Flight) -> float:
+    """Turn ``hands`` into ``aided``, which holds the controls that acted last.
+
+    Args:
+        flight: The flight as ``observe`` left it.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    hands, aided = scratch.command[STATION.hands], scratch.command[STATION.aided]
+    angle = scratch.motion[MOTION.angle]
+    airspeed = aids_airspeed(state.aids, state.switches, scratch.seen)
+    expected = flap_schedule(tables.plant.controls, airspeed, angle)
+    flap_parts(tables.flaps, flap_now(state.flaps, scratch.scheduled[0]), expected, scratch.flaps)
+    aids_step(
+        tables.aids, state.aids, state.switches, scratch.seen, angle, hands, scratch.flaps, aided, tables.dt
+    )  # fmt: skip
+    return 0.0
+
+
+@part
+def move_air(flight: Flight, elapsed: float, normals: FloatArray) -> float:
+    """Move gusts and turbulence on.
+
+    Args:
+        flight: The flight.
+        elapsed: Length of the frame before [s].
+        normals: Standard normals of the turbulence.
+    """
+    tables, state, x = flight.tables, flight.state, flight.state.x
+    time = state.clock[CLOCK.frame] * tables.dt
+    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2)
+    altitude, pitch = x[STATE.altitude], x[STATE.pitch]
+    gust_step(
+        tables.gusts, state.gusts, speed, altitude, pitch, time, elapsed, normals, flight.scratch.gust
+    )  # fmt: skip
+    return 0.0
+
+
+@part
+def schedule_faults(flight: Flight) -> float:
+    """Let the failures begin or end that are due now.
+
+    Args:
+        flight: The flight at the start of a frame.
+    """
+    tables, state, x = flight.tables, flight.state, flight.state.x
+    time = state.clock[CLOCK.frame] * tables.dt
+    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch]) + state.gusts[G_AHEAD]
+    fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
+    return 0.0
+
+
+@part
+def fail_actuators(flight: Flight) -> float:
+    """Prepare the plant's step for failed actuators and a limited engine.
+
+    Args:
+        flight: The flight before the step.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    acting = scratch.command[STATION.acting]
+    torque = 2.0 * scratch.y[OUTPUT.torque]
+    power = torque * (tables.drive.governed_speed + state.drive[DEVIATION])
+    # Where an engine fails, collective is taken off until the power suffices to bring the rotors back too.
+    power = governor_power(tables.drive, state.drive, power)
+    governed = state.switches[GOVERNOR] != 0.0
+    fault_actuators_begin(
+        tables.faults,
+        state.faults,
+        tables.plant.controls,
+        state.x,
+        (acting[CHANNEL.stick], acting[CHANNEL.lever]),
+        scratch.path[1, 0],
+        (power, governed),
+        tables.dt,
+        scratch.planned,
+    )
+    return 0.0
+
+
+@part
+def rate_of_automatic_nacelle(flight: Flight) -> float:
+    """Nacelle rate that the automatic nacelle control wants in this frame [rad/s].
+
+    Args:
+        flight: The flight as being observed.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    speed_rate = scratch.y[OUTPUT.airspeed_rate]
+    shown, angle = scratch.shown[0], state.nacelle[0]
+    return float(automatic_rate(tables.automatic, state.automatic, shown, speed_rate, angle, tables.dt))
+
+
+@part
+def advance_automatic_nacelle(flight: Flight) -> float:
+    """Advance the automatic nacelle control.
+
+    Args:
+        flight: The flight with its command at all stations.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    speed_rate, rate = scratch.y[OUTPUT.airspeed_rate], scratch.command[STATION.acting, CHANNEL.nacelle_rate]
+    automatic_advance(tables.automatic, state.automatic, scratch.shown[0], speed_rate, rate, tables.dt)
+    return 0.0
+
+
+@part
+def act_script(flight: Flight) -> float:
+    """Let scripted hands change the pilot's command.
+
+    Args:
+        flight: The flight as its pilot was asked.
+    """
+    tables, scratch = flight.tables, flight.scratch
+    time = flight.state.clock[CLOCK.frame] * tables.dt
+    script.script_command(tables.script.pulses, flight.state.script, time, scratch.command[STATION.pilot])
+    return 0.0
+
+
+@part
+def notice_warning(flight: Flight) -> float:
+    """Let a pilot who yields take notice of what he was shown and felt in the frame that is over.
+
+    Args:
+        flight: The flight at the start of the next frame.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    time = state.clock[CLOCK.frame] * tables.dt
+    warned = script.warns(scratch.shown, scratch.row)
+    script.script_notice(state.script, tables.script.reaction, time, warned, scratch.shown[0], state.reference)
+    return 0.0
