@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
+from rtsim.places import Places
+
 
 @dataclass(frozen=True, slots=True)
 class Command:
@@ -83,6 +85,10 @@ class Sensors:
     """The nacelles rest on the airplane-mode stop."""
     nacelle_ok: bool
     """The conversion actuator follows its commands."""
+
+
+SENSOR = Places(*Sensors.__slots__)
+"""Places of the sensor values in an array, SI and radians, booleans as 0 and 1."""
 
 
 @dataclass(frozen=True, slots=True)

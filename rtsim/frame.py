@@ -8,13 +8,43 @@ kernels write through ``COLUMN``. A row describes the aircraft at the *start* of
 from __future__ import annotations
 
 import hashlib
-from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from rtsim.places import Places
+from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, POUND_FORCE, RPM
+
+
+class Unit(NamedTuple):
+    """A unit of the columns."""
+
+    suffix: str
+    """What it adds to a name."""
+    scale: float
+    """One of it in SI."""
+
+
+UNITS: dict[str, Unit] = {
+    "": Unit("", 1.0),
+    "s": Unit("_s", 1.0),
+    "us": Unit("_us", 1e-6),
+    "m": Unit("_m", 1.0),
+    "m/s": Unit("_m_s", 1.0),
+    "rad/s": Unit("_rad_s", 1.0),
+    "kn": Unit("_kt", KNOT),
+    "kn/s": Unit("_kt_s", KNOT),
+    "deg": Unit("_deg", DEGREE),
+    "deg/s": Unit("_deg_s", DEGREE),
+    "lb": Unit("_lb", POUND_FORCE),
+    "shp": Unit("_shp", HORSEPOWER),
+    "in lb": Unit("_inlb", INCH_POUND),
+    "rpm": Unit("_rpm", RPM),
+}
+"""Units of signals, as shown on axes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +59,11 @@ class Signal:
     """The plot and table it belongs to."""
     description: str
     """One sentence for people."""
+
+    @property
+    def quantity(self) -> str:
+        """The name without its unit."""
+        return self.name.removesuffix(UNITS[self.unit].suffix)
 
 
 SIGNALS: tuple[Signal, ...] = (
@@ -137,14 +172,19 @@ TIMING_SIGNALS: tuple[Signal, ...] = (
 )
 """Wall-clock columns of a live flight; logged beside the history and never part of its hash."""
 
+NACELLES_JAMMED = 1
+"""Bit of the column ``failures`` that says that the nacelles do not follow their commands."""
 SIGNAL_NAMES: tuple[str, ...] = tuple(signal.name for signal in SIGNALS)
 SIGNAL_COUNT = len(SIGNALS)
 
-_ColumnType = namedtuple("_ColumnType", SIGNAL_NAMES)  # type: ignore[misc]  # names are data
-COLUMN: Any = _ColumnType(*range(SIGNAL_COUNT))
+COLUMN = Places(*SIGNAL_NAMES)
 """Column number by signal name: ``COLUMN.airspeed_kt``; usable inside compiled kernels."""
+QUANTITY = Places(*(signal.quantity for signal in SIGNALS))
+"""The same columns in SI, by the name without its unit: ``QUANTITY.airspeed``. The frame works with these."""
 
 FloatArray = npt.NDArray[np.float64]
+UNIT_SCALES: FloatArray = np.array([UNITS[signal.unit].scale for signal in SIGNALS])
+"""What a column's number is multiplied by to be in SI, shape (SIGNAL_COUNT,)."""
 
 
 def history_sha256(chunks: Sequence[FloatArray]) -> str:

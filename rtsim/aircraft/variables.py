@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import namedtuple
 from dataclasses import dataclass
-from typing import Any
+
+from rtsim.places import Places
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +68,9 @@ FLAP_INPUTS = ("flap_0_20", "flap_20_40", "flap_40_75")
 """Inputs that move the flaps: one for each interval between published settings, in which the aerodynamics are linear
 in the deflection. Together they are the flap deflection less that of the schedule."""
 
-_States = namedtuple("_States", [v.name for v in STATES])  # type: ignore[misc]
-_Inputs = namedtuple("_Inputs", [v.name for v in INPUTS])  # type: ignore[misc]
-_Outputs = namedtuple("_Outputs", [v.name for v in OUTPUTS])  # type: ignore[misc]
-STATE: Any = _States(*range(len(STATES)))
+STATE = Places(*(variable.name for variable in STATES))
 """Index of a state by name, usable in compiled kernels."""
-INPUT: Any = _Inputs(*range(len(INPUTS)))
+INPUT = Places(*(variable.name for variable in INPUTS))
 """Index of an input by name."""
-OUTPUT: Any = _Outputs(*range(len(OUTPUTS)))
+OUTPUT = Places(*(variable.name for variable in OUTPUTS))
 """Index of an output by name."""

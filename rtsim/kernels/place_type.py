@@ -10,7 +10,7 @@ from numba.core.imputils import lower_constant
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, lower_getattr_generic, models, register_model, typeof_impl
 
-from rtsim.kernels.places import Places
+from rtsim.places import Places
 
 
 class PlacesType(types.Type):

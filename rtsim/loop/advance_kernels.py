@@ -12,19 +12,20 @@ from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.atmosphere.gust_kernels import G_BUSY
 from rtsim.corridor.corridor_kernels import corridor_level_step
+from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import F_ENGINE, F_POWER, fault_actuators_end, fault_nacelle_rate
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN, QUANTITY, FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, MODE, PART, PROGRAMME, REFERENCE, STATION, TARGET, Flight
-from rtsim.loop.observe_kernels import programme_at, sense
+from rtsim.loop.observe_kernels import programme_at
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
-from rtsim.systems.drive_kernels import DEVIATION, drive_advance
+from rtsim.systems.drive_kernels import DEVIATION, drive_advance, engine_power
 from rtsim.systems.flap_kernels import flap_advance
-from rtsim.units import DEGREE, KNOT
+from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
 """Sink rates at touchdown up to which a landing counts as gentle or as hard [m/s]; beyond it is a crash. Ours: about
@@ -96,30 +97,37 @@ def aid(flight: Flight) -> None:
 
 @inner_kernel
 def protect(flight: Flight) -> None:
-    """Let the compiled law limit ``aided``. Writes ``protected`` and the row's columns of the protection.
+    """Let the compiled law limit ``aided``. Writes ``protected``, and notes what was changed.
 
     Args:
         flight: The flight; the law's state is updated.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
-    row, aided, limited = scratch.row, scratch.command[STATION.aided], scratch.command[STATION.protected]
+    aided, limited = scratch.command[STATION.aided], scratch.command[STATION.protected]
     if law_due(tables.protection, state.protection, int(state.clock[CLOCK.frame])):
-        sense(flight)
         call_at(flight.parts[PART.decide], flight)
     law_apply(tables.protection, state.protection, aided, limited)
-    row[COLUMN.protection_stick] = limited[CHANNEL.stick] - aided[CHANNEL.stick]
-    row[COLUMN.protection_lever] = limited[CHANNEL.lever] - aided[CHANNEL.lever]
-    rate = limited[CHANNEL.nacelle_rate] - aided[CHANNEL.nacelle_rate]
-    row[COLUMN.protection_nacelle_rate_deg_s] = rate / DEGREE
-    row[COLUMN.protection_stick_reason] = state.protection[law.L_STICK_CAUSE]
-    row[COLUMN.protection_lever_reason] = state.protection[law.L_LEVER_CAUSE]
-    row[COLUMN.protection_nacelle_reason] = state.protection[law.L_RATE_CAUSE]
-    row[COLUMN.time_to_limit_s] = state.protection[law.L_TIME]
+    law_state, si = state.protection, scratch.si
+    _note_change(flight, law_state[law.L_STICK_CAUSE], law_state[law.L_LEVER_CAUSE], law_state[law.L_RATE_CAUSE])
+    si[QUANTITY.time_to_limit] = law_state[law.L_TIME]
+
+
+@inner_kernel
+def _note_change(flight: Flight, stick_reason: float, lever_reason: float, nacelle_reason: float) -> None:
+    """Note what the protection changed, and the limits behind it."""
+    si, command = flight.scratch.si, flight.scratch.command
+    aided, limited = command[STATION.aided], command[STATION.protected]
+    si[QUANTITY.protection_stick] = limited[CHANNEL.stick] - aided[CHANNEL.stick]
+    si[QUANTITY.protection_lever] = limited[CHANNEL.lever] - aided[CHANNEL.lever]
+    si[QUANTITY.protection_nacelle_rate] = limited[CHANNEL.nacelle_rate] - aided[CHANNEL.nacelle_rate]
+    si[QUANTITY.protection_stick_reason] = stick_reason
+    si[QUANTITY.protection_lever_reason] = lever_reason
+    si[QUANTITY.protection_nacelle_reason] = nacelle_reason
 
 
 @inner_kernel
 def hold(flight: Flight) -> None:
-    """Put what laws in Python hold in the place of ``protected``, and record it.
+    """Put what laws in Python hold in the place of ``protected``, and note it.
 
     Args:
         flight: The flight as ``protect`` left it.
@@ -130,17 +138,11 @@ def hold(flight: Flight) -> None:
         return
     if state.protection[law.L_OVERRIDE] != 0.0:
         return
-    row, limited = scratch.row, scratch.command[STATION.protected]
+    limited = scratch.command[STATION.protected]
     for channel in range(CHANNEL.size):
         if not math.isnan(held[channel]):
             limited[channel] = held[channel]
-    aided = scratch.command[STATION.aided]
-    row[COLUMN.protection_stick] = limited[CHANNEL.stick] - aided[CHANNEL.stick]
-    row[COLUMN.protection_lever] = limited[CHANNEL.lever] - aided[CHANNEL.lever]
-    row[COLUMN.protection_nacelle_rate_deg_s] = (limited[CHANNEL.nacelle_rate] - aided[CHANNEL.nacelle_rate]) / DEGREE
-    row[COLUMN.protection_stick_reason] = held[HELD.stick_reason]
-    row[COLUMN.protection_lever_reason] = held[HELD.lever_reason]
-    row[COLUMN.protection_nacelle_reason] = held[HELD.nacelle_reason]
+    _note_change(flight, held[HELD.stick_reason], held[HELD.lever_reason], held[HELD.nacelle_reason])
 
 
 @inner_kernel
@@ -159,13 +161,14 @@ def fail(flight: Flight) -> None:
 
 @inner_kernel
 def record(flight: Flight) -> None:
-    """Complete the row with the command and what came of it.
+    """Add the command and what came of it, and write the row: the one place where SI ends.
 
     Args:
         flight: The flight with its command at all stations; the corridor's levels are advanced.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
-    row, pilot, acting = scratch.row, scratch.command[STATION.pilot], scratch.command[STATION.acting]
+    si, row = scratch.si, scratch.row
+    pilot, acting = scratch.command[STATION.pilot], scratch.command[STATION.acting]
     margin = min(scratch.margins[0], scratch.margins[1])
     controls = tables.plant.controls
     stick, lever = acting[CHANNEL.stick], acting[CHANNEL.lever]
@@ -173,14 +176,19 @@ def record(flight: Flight) -> None:
     elevator_stop = abs(state.x[STATE.elevator]) >= controls.elevator_limit * (1.0 - 1e-9)
     stick_stop = abs(stick) >= 1.0
     lever_stop = lever <= 0.0 or lever >= 1.0
-    row[COLUMN.stick] = stick
-    row[COLUMN.lever] = lever
-    row[COLUMN.pilot_stick] = pilot[CHANNEL.stick]
-    row[COLUMN.pilot_lever] = pilot[CHANNEL.lever]
-    row[COLUMN.pilot_nacelle_rate_rad_s] = pilot[CHANNEL.nacelle_rate]
-    row[COLUMN.nacelle_command_rate_deg_s] = acting[CHANNEL.nacelle_rate] / DEGREE
-    row[COLUMN.corridor_level] = float(corridor_level_step(tables.corridor, margin, tables.dt, state.level))
-    row[COLUMN.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
+    si[QUANTITY.stick] = stick
+    si[QUANTITY.lever] = lever
+    si[QUANTITY.pilot_stick] = pilot[CHANNEL.stick]
+    si[QUANTITY.pilot_lever] = pilot[CHANNEL.lever]
+    si[QUANTITY.pilot_nacelle_rate] = pilot[CHANNEL.nacelle_rate]
+    si[QUANTITY.nacelle_command_rate] = acting[CHANNEL.nacelle_rate]
+    si[QUANTITY.corridor_level] = float(corridor_level_step(tables.corridor, margin, tables.dt, state.level))
+    si[QUANTITY.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
+    for column in range(row.shape[0]):
+        row[column] = si[column] / tables.units[column]
+    # Divided in this order since the first history; the other order differs in the last bit.
+    shaft = engine_power(state.drive, si[QUANTITY.power])
+    row[COLUMN.engine_power_shp] = shaft / HORSEPOWER / TRANSMISSION_EFFICIENCY
 
 
 @inner_kernel

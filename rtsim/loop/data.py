@@ -15,10 +15,10 @@ from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.faults.fault_kernels import FaultTables
 from rtsim.frame import FloatArray
 from rtsim.kernels.packed import Address
-from rtsim.kernels.places import Places
 from rtsim.nacelle.automatic_kernels import AutomaticTables
 from rtsim.nacelle.nacelle_kernels import NacelleTables
 from rtsim.pilot.pilot_kernels import PilotTables
+from rtsim.places import Places
 from rtsim.protection.law_data import ProtectionTables
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
@@ -63,11 +63,11 @@ CHANNEL = Places("stick", "lever", "nacelle_rate")
 HELD = Places("stick", "lever", "nacelle_rate", "stick_reason", "lever_reason", "nacelle_reason")
 """What laws in Python hold until their next decision (NaN: the channel is the pilot's), and the limits behind it."""
 PART = Places(
-    "outputs", "step", "ask", "advance", "engage", "decide", "aids", "air", "faults", "fail", "automatic_rate",
+    "outputs", "step", "ask", "advance", "decide", "aids", "air", "faults", "fail", "automatic_rate",
     "automatic_advance", "script", "notice", "measure",
 )  # fmt: skip
 """Parts of the frame that are compiled on their own, by their places in ``Flight.parts``: plant (outputs, step), pilot
-(ask, advance, engage), law (decide), pilot aids, gusts, failures (schedule, actuators), automatic nacelle, and what a
+(ask, advance), law (decide), pilot aids, gusts, failures (schedule, actuators), automatic nacelle, and what a
 batch hands in: a script (before, after the frame) and a measure of each row."""
 
 
@@ -125,6 +125,8 @@ class SimulationTables(NamedTuple):
     """Rows ``PROGRAMME``: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
     script: ScriptTables
     """Scripted hands."""
+    units: FloatArray
+    """One unit of each column of the row in SI."""
     reference_frequency: float
     """Natural frequency of the critically damped airspeed reference filter [rad/s]."""
 
@@ -206,8 +208,10 @@ class Scratch(NamedTuple):
     """What the protection law may know."""
     law: FloatArray
     """Work array of the law."""
+    si: FloatArray
+    """The frame's quantities, SI and radians (``rtsim.frame.QUANTITY``)."""
     row: FloatArray
-    """The frame's row, see ``rtsim.frame``."""
+    """The frame's row: the same in the units of its columns."""
 
 
 class Flight(NamedTuple):

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.aircraft.variables import INPUT
 from rtsim.atmosphere.air import normals_needed
 from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Packed, packed
 from rtsim.kernels.parts import address_of, entry_point
 from rtsim.loop import frame_kernels as frames_of
@@ -22,12 +24,14 @@ from rtsim.loop.data import (
     CLOCK,
     END,
     END_REASONS,
+    MOTION,
     PART,
     Flight,
     Scratch,
     SimulationState,
     SimulationTables,
 )
+from rtsim.pilot.engage_kernels import mocm_engage
 from rtsim.protection.law_data import LAW_MONITOR
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 
@@ -41,6 +45,7 @@ _ADDRESSES: dict[tuple[str, Any], int] = {}
 BLOCK = 2_048
 """Frames for which noise is drawn at a time in a flight that keeps no rows."""
 Streams = tuple[np.random.Generator, np.random.Generator]
+_ENGAGE = interpreted(mocm_engage)
 Measure = Callable[[Any], float]
 """A compiled part that looks at ``flight.scratch.row`` after each frame and adds to ``flight.measures``."""
 
@@ -92,7 +97,7 @@ class Flying:
         self.streams = streams
         """Random streams of the pilot's noise and of the turbulence."""
         self.noise_width, self._nonlinear = noise_width, nonlinear
-        for name in ("outputs", "step", "ask", "advance", "engage"):
+        for name in ("outputs", "step", "ask", "advance"):
             self._load(name)
         if tables.automatic.active:
             self._load("automatic_rate")
@@ -181,6 +186,17 @@ class Flying:
             self._load_missing()
             self._call(NO_ROWS, _NO_NORMALS, _STILL, 1, stages)
 
+    def engage(self) -> None:
+        """Let the MOCM take the controls as they are: its state is set so that its first output equals them.
+
+        Done in interpreted kernels: it happens once in a flight, and compiling it takes longer than a thousand times.
+        """
+        self.do(frames_of.OBSERVE)
+        tables, state, scratch = self.tables, self.state, self.scratch
+        present = np.array([state.u[INPUT.stick], state.u[INPUT.lever]])
+        angle, rate = (float(scratch.motion[place]) for place in (MOTION.angle, MOTION.rate))
+        _ENGAGE(tables.pilot, state.pilot, scratch.seen, angle, rate, scratch.target, present)
+
     def take(self, state: SimulationState) -> None:
         """Take another state.
 
@@ -223,7 +239,6 @@ class Flying:
 _PARTS: dict[str, Any] = {
     "ask": parts.ask_mocm,
     "advance": parts.advance_mocm,
-    "engage": parts.engage_mocm,
     "aids": parts.act_aids,
     "air": parts.move_air,
     "faults": parts.schedule_faults,

@@ -31,9 +31,9 @@ from rtsim.loop.data import CLOCK, END, MODE, PART, Flight
 from rtsim.loop.observe_kernels import observe, sense
 from rtsim.protection.law_data import LAW_OFF
 
-OBSERVE, ASK, SCRIPT, LIMIT, COMPLETE, ENGAGE, DISTURB, CONSULT = 1, 2, 4, 8, 16, 32, 64, 128
+OBSERVE, ASK, SCRIPT, LIMIT, COMPLETE, DISTURB, CONSULT = 1, 2, 4, 8, 16, 32, 64
 """Stages of a frame, which a caller may take one by one: observe; ask the pilot; let a script change what he gave; aids
-and law; the rest. Besides: engage the MOCM; bring gusts and failures to the first frame; ask the MOCM whoever flies."""
+and law; the rest. Besides: bring gusts and failures to the first frame; ask the MOCM whoever flies."""
 WHOLE = OBSERVE | ASK | SCRIPT | LIMIT | COMPLETE
 
 
@@ -52,8 +52,6 @@ def advance(flight: Flight, stages: int, pilot_normals: FloatArray, air_normals:
     if stages & OBSERVE:
         observe(flight)
         sense(flight)
-    if stages & ENGAGE:
-        call_at(flight.parts[PART.engage], flight)
     if stages & CONSULT:
         call_at(flight.parts[PART.ask], flight)
     if stages & ASK:

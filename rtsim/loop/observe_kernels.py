@@ -7,18 +7,18 @@ import math
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_Q, G_U, G_W
+from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import corridor_margins
 from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import QUANTITY, FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, TARGET, Flight
+from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
-from rtsim.protection import law_data as law
 from rtsim.systems.drive_kernels import DEVIATION, engine_power
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
-from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, POUND_FORCE, RPM
 
 
 @inner_kernel
@@ -49,14 +49,14 @@ def programme_at(programme: FloatArray, row: int, time: float) -> float:
 
 @inner_kernel
 def observe(flight: Flight) -> None:
-    """Fill the row with all that is known before the command of this frame; changes no state.
+    """Find all that is known before the command of this frame; changes no state.
 
     Args:
-        flight: The flight; afterwards its work space holds outputs, margins, the pilot's target and the row, commands
-            excepted.
+        flight: The flight; afterwards its work space holds outputs, margins, the pilot's target and the quantities of
+            the row, commands excepted.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
-    row = scratch.row
+    si = scratch.si
     x = state.x
     gusts = state.gusts
     frame = state.clock[CLOCK.frame]
@@ -87,54 +87,52 @@ def observe(flight: Flight) -> None:
 
     _ask(flight, time)
 
-    row[COLUMN.frame] = frame
-    row[COLUMN.time_s] = time
-    row[COLUMN.airspeed_kt] = airspeed / KNOT
-    row[COLUMN.airspeed_reference_kt] = scratch.target[TARGET.airspeed] / KNOT
-    row[COLUMN.nacelle_deg] = angle / DEGREE
-    row[COLUMN.nacelle_reference_deg] = state.nacelle[0] / DEGREE
-    row[COLUMN.altitude_m] = x[STATE.altitude]
-    row[COLUMN.pitch_deg] = x[STATE.pitch] / DEGREE
-    row[COLUMN.flapping_deg] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2) / DEGREE
-    row[COLUMN.nacelle_rate_deg_s] = rate / DEGREE
-    row[COLUMN.airspeed_command_kt] = programme_at(tables.programme, PROGRAMME.airspeed, time) / KNOT
-    row[COLUMN.altitude_reference_m] = scratch.target[TARGET.altitude]
-    row[COLUMN.airspeed_rate_kt_s] = y[OUTPUT.airspeed_rate] / KNOT
-    row[COLUMN.ground_speed_kt] = (through + tables.wind) / KNOT
-    row[COLUMN.climb_rate_m_s] = climb
-    row[COLUMN.distance_m] = state.clock[CLOCK.distance]
-    row[COLUMN.flight_path_deg] = math.atan2(climb, max(abs(through), 1.0)) / DEGREE
-    row[COLUMN.angle_of_attack_deg] = (
-        math.atan2(x[STATE.w] + gusts[G_W] + 4.5 * st, x[STATE.u] + gusts[G_U] + 4.5 * ct) / DEGREE
-    )
-    row[COLUMN.pitch_rate_deg_s] = x[STATE.q] / DEGREE
-    row[COLUMN.body_u_m_s] = x[STATE.u]
-    row[COLUMN.body_w_m_s] = x[STATE.w]
-    row[COLUMN.load_factor] = y[OUTPUT.load_factor]
-    row[COLUMN.coning_deg] = x[STATE.coning] / DEGREE
-    row[COLUMN.longitudinal_flapping_deg] = x[STATE.flap_1c] / DEGREE
-    row[COLUMN.lateral_flapping_deg] = x[STATE.flap_1s] / DEGREE
-    row[COLUMN.collective_75_deg] = x[STATE.collective_75] / DEGREE
-    row[COLUMN.cyclic_deg] = x[STATE.cyclic_1s] / DEGREE
-    row[COLUMN.elevator_deg] = x[STATE.elevator] / DEGREE
-    row[COLUMN.flap_deg] = flap_now(state.flaps, flap_scheduled) / DEGREE
-    row[COLUMN.thrust_per_rotor_lb] = y[OUTPUT.thrust] / POUND_FORCE
-    row[COLUMN.power_shp] = power / HORSEPOWER
-    row[COLUMN.engine_power_shp] = engine_power(state.drive, power) / HORSEPOWER / TRANSMISSION_EFFICIENCY
-    row[COLUMN.mast_torque_inlb] = y[OUTPUT.torque] / INCH_POUND
-    row[COLUMN.rotor_speed_rpm] = rotor_speed / RPM
-    row[COLUMN.margin_kt] = min(scratch.margins[0], scratch.margins[1]) / KNOT
-    row[COLUMN.margin_low_kt] = scratch.margins[0] / KNOT
-    row[COLUMN.margin_high_kt] = scratch.margins[1] / KNOT
-    row[COLUMN.nacelle_forward_deg] = scratch.margins[2] / DEGREE
-    row[COLUMN.nacelle_aft_deg] = scratch.margins[3] / DEGREE
-    row[COLUMN.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
-    row[COLUMN.pilot_mode] = state.clock[CLOCK.mode]
-    row[COLUMN.airspeed_indicated_kt] = scratch.shown[0] / KNOT
-    row[COLUMN.gust_u_m_s] = gusts[G_U]
-    row[COLUMN.gust_w_m_s] = gusts[G_W]
-    row[COLUMN.gust_q_deg_s] = gusts[G_Q] / DEGREE
-    row[COLUMN.failures] = float(fault_mask(state.faults))
+    si[QUANTITY.frame] = frame
+    si[QUANTITY.time] = time
+    si[QUANTITY.airspeed] = airspeed
+    si[QUANTITY.airspeed_reference] = scratch.target[TARGET.airspeed]
+    si[QUANTITY.nacelle] = angle
+    si[QUANTITY.nacelle_reference] = state.nacelle[0]
+    si[QUANTITY.altitude] = x[STATE.altitude]
+    si[QUANTITY.pitch] = x[STATE.pitch]
+    si[QUANTITY.flapping] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2)
+    si[QUANTITY.nacelle_rate] = rate
+    si[QUANTITY.airspeed_command] = programme_at(tables.programme, PROGRAMME.airspeed, time)
+    si[QUANTITY.altitude_reference] = scratch.target[TARGET.altitude]
+    si[QUANTITY.airspeed_rate] = y[OUTPUT.airspeed_rate]
+    si[QUANTITY.ground_speed] = through + tables.wind
+    si[QUANTITY.climb_rate] = climb
+    si[QUANTITY.distance] = state.clock[CLOCK.distance]
+    si[QUANTITY.flight_path] = math.atan2(climb, max(abs(through), 1.0))
+    si[QUANTITY.angle_of_attack] = scheduling_alpha(x[STATE.u] + gusts[G_U], x[STATE.w] + gusts[G_W], st, ct)
+    si[QUANTITY.pitch_rate] = x[STATE.q]
+    si[QUANTITY.body_u] = x[STATE.u]
+    si[QUANTITY.body_w] = x[STATE.w]
+    si[QUANTITY.load_factor] = y[OUTPUT.load_factor]
+    si[QUANTITY.coning] = x[STATE.coning]
+    si[QUANTITY.longitudinal_flapping] = x[STATE.flap_1c]
+    si[QUANTITY.lateral_flapping] = x[STATE.flap_1s]
+    si[QUANTITY.collective_75] = x[STATE.collective_75]
+    si[QUANTITY.cyclic] = x[STATE.cyclic_1s]
+    si[QUANTITY.elevator] = x[STATE.elevator]
+    si[QUANTITY.flap] = flap_now(state.flaps, flap_scheduled)
+    si[QUANTITY.thrust_per_rotor] = y[OUTPUT.thrust]
+    si[QUANTITY.power] = power
+    si[QUANTITY.engine_power] = engine_power(state.drive, power) / TRANSMISSION_EFFICIENCY
+    si[QUANTITY.mast_torque] = y[OUTPUT.torque]
+    si[QUANTITY.rotor_speed] = rotor_speed
+    si[QUANTITY.margin] = min(scratch.margins[0], scratch.margins[1])
+    si[QUANTITY.margin_low] = scratch.margins[0]
+    si[QUANTITY.margin_high] = scratch.margins[1]
+    si[QUANTITY.nacelle_forward] = scratch.margins[2]
+    si[QUANTITY.nacelle_aft] = scratch.margins[3]
+    si[QUANTITY.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
+    si[QUANTITY.pilot_mode] = state.clock[CLOCK.mode]
+    si[QUANTITY.airspeed_indicated] = scratch.shown[0]
+    si[QUANTITY.gust_u] = gusts[G_U]
+    si[QUANTITY.gust_w] = gusts[G_W]
+    si[QUANTITY.gust_q] = gusts[G_Q]
+    si[QUANTITY.failures] = float(fault_mask(state.faults))
 
 
 @inner_kernel
@@ -184,20 +182,19 @@ def sense(flight: Flight) -> None:
     Args:
         flight: The flight as ``observe`` left it.
     """
-    state, scratch = flight.state, flight.scratch
-    x, row, sensors = state.x, scratch.row, scratch.sensors
-    sensors[law.SENSE_TIME] = row[COLUMN.time_s]
-    sensors[law.SENSE_AIRSPEED] = row[COLUMN.airspeed_indicated_kt] * KNOT
-    sensors[law.SENSE_AIRSPEED_RATE] = row[COLUMN.airspeed_rate_kt_s] * KNOT
-    sensors[law.SENSE_NACELLE] = scratch.motion[MOTION.angle]
-    sensors[law.SENSE_NACELLE_RATE] = scratch.motion[MOTION.rate]
-    sensors[law.SENSE_PITCH] = x[STATE.pitch]
-    sensors[law.SENSE_PITCH_RATE] = x[STATE.q]
-    sensors[law.SENSE_FLIGHT_PATH] = row[COLUMN.flight_path_deg] * DEGREE
-    sensors[law.SENSE_ALTITUDE] = x[STATE.altitude]
-    sensors[law.SENSE_CLIMB_RATE] = row[COLUMN.climb_rate_m_s]
-    sensors[law.SENSE_LOAD_FACTOR] = row[COLUMN.load_factor]
-    sensors[law.SENSE_TORQUE] = row[COLUMN.mast_torque_inlb] * INCH_POUND
-    sensors[law.SENSE_FLAPPING] = row[COLUMN.flapping_deg] * DEGREE
-    sensors[law.SENSE_DOWNSTOP] = row[COLUMN.on_downstop]
-    sensors[law.SENSE_NACELLE_OK] = 1.0 if fault_nacelle_ok(state.faults) else 0.0
+    si, sensors = flight.scratch.si, flight.scratch.sensors
+    sensors[SENSOR.time] = si[QUANTITY.time]
+    sensors[SENSOR.airspeed] = si[QUANTITY.airspeed_indicated]
+    sensors[SENSOR.airspeed_rate] = si[QUANTITY.airspeed_rate]
+    sensors[SENSOR.nacelle_angle] = si[QUANTITY.nacelle]
+    sensors[SENSOR.nacelle_rate] = si[QUANTITY.nacelle_rate]
+    sensors[SENSOR.pitch] = si[QUANTITY.pitch]
+    sensors[SENSOR.pitch_rate] = si[QUANTITY.pitch_rate]
+    sensors[SENSOR.flight_path_angle] = si[QUANTITY.flight_path]
+    sensors[SENSOR.altitude] = si[QUANTITY.altitude]
+    sensors[SENSOR.climb_rate] = si[QUANTITY.climb_rate]
+    sensors[SENSOR.load_factor] = si[QUANTITY.load_factor]
+    sensors[SENSOR.mast_torque] = si[QUANTITY.mast_torque]
+    sensors[SENSOR.flapping] = si[QUANTITY.flapping]
+    sensors[SENSOR.on_downstop] = si[QUANTITY.on_downstop]
+    sensors[SENSOR.nacelle_ok] = 1.0 if fault_nacelle_ok(flight.state.faults) else 0.0

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 from rtsim.aids.aids_kernels import GOVERNOR, aids_airspeed, aids_step
-from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
+from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
 from rtsim.atmosphere.gust_kernels import G_AHEAD, gust_step
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
 from rtsim.frame import FloatArray
-from rtsim.kernels.compiled import kernel, part
+from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
 from rtsim.loop.data import CHANNEL, CLOCK, MOTION, STATION, TARGET, Flight
 from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
-from rtsim.pilot.engage_kernels import mocm_engage
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
 from rtsim.protection.law_kernels import law_decide, law_watch
 from rtsim.systems.drive_kernels import DEVIATION, governor_power
@@ -48,21 +47,6 @@ def advance_mocm(flight: Flight, normals: FloatArray) -> float:
     scalars = (scratch.motion[MOTION.angle], scratch.motion[MOTION.rate], tables.dt)
     acting = scratch.command[STATION.protected]
     mocm_advance_in(tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, normals, scratch.pilot)
-    return 0.0
-
-
-@kernel
-def engage_mocm(flight: Flight) -> float:
-    """Let the MOCM take the controls as they are: its state is set so that its first output equals them.
-
-    Args:
-        flight: The flight as ``observe`` left it.
-    """
-    tables, state, scratch = flight.tables, flight.state, flight.scratch
-    acting = scratch.command[STATION.acting]
-    acting[CHANNEL.stick], acting[CHANNEL.lever] = state.u[INPUT.stick], state.u[INPUT.lever]
-    angle, rate = scratch.motion[MOTION.angle], scratch.motion[MOTION.rate]
-    mocm_engage(tables.pilot, state.pilot, scratch.seen, angle, rate, scratch.target, acting)
     return 0.0
 
 

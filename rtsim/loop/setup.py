@@ -17,11 +17,12 @@ from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
 from rtsim.choices import CorridorName, PlantName, SwitchName
+from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
 from rtsim.faults import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
 from rtsim.loop import frame_kernels as frames_of
@@ -59,7 +60,7 @@ from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
-from rtsim.protection.law_data import LAW_STATE_SIZE, SENSOR_COUNT, WORK_SIZE, ProtectionTables
+from rtsim.protection.law_data import LAW_STATE_SIZE, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
@@ -210,6 +211,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         protection=_law(compiled_law(load_laws(options.protection)) or "monitor", corridor, database, dt),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
+        units=UNIT_SCALES,
         reference_frequency=REFERENCE_FREQUENCY,
     )
     return Parts(
@@ -250,8 +252,9 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
         planned=np.zeros(3),
         gust=np.zeros(3),
-        sensors=np.zeros(SENSOR_COUNT),
+        sensors=np.zeros(SENSOR.size),
         law=np.zeros(WORK_SIZE),
+        si=np.zeros(SIGNAL_COUNT),
         row=np.zeros(SIGNAL_COUNT),
     )
 
@@ -361,7 +364,8 @@ def prepare(
         measure=measure,
         unlocked=unlocked,
     )
-    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+    flying.do(frames_of.DISTURB)
+    flying.engage()
     return flying
 
 
@@ -375,7 +379,8 @@ def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
     """
     flying.streams = new_streams(setup.options.seed)
     flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
-    flying.do(frames_of.DISTURB | frames_of.OBSERVE | frames_of.ENGAGE)
+    flying.do(frames_of.DISTURB)
+    flying.engage()
 
 
 __all__ = ["FlightSetup", "Parts", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]

@@ -19,11 +19,11 @@ from rtsim.errors import InputError
 from rtsim.faults import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.loop.data import CLOCK, END_REASONS, MODES, STATION, TARGET, SimulationState
 from rtsim.loop.flying import WHOLE, Flying
-from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, ENGAGE, LIMIT, OBSERVE, SCRIPT
+from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
@@ -31,7 +31,6 @@ from rtsim.protection.law_data import L_OVERRIDE
 from rtsim.protection.laws import load_laws
 from rtsim.systems.flap_kernels import FLAP_SETTING
 from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, trim_throttle
-from rtsim.units import KNOT
 
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
@@ -74,7 +73,6 @@ class Simulation:
         """The flight as it is flown."""
         self.tables = self.flying.tables
         self._state, self._scratch = self.flying.state, self.flying.scratch
-        self._row = self._scratch.row
         self._observed = True
         if laws is None:
             options = setup.options
@@ -225,11 +223,10 @@ class Simulation:
         if command is not None:
             self._state.u[INPUT.stick], self._state.u[INPUT.lever] = command.stick, command.lever
         if mode == "mocm" and self.mode != "mocm":
-            self.flying.do(OBSERVE | ENGAGE)
+            self.flying.engage()
             self._observed = True
         self._state.clock[CLOCK.mode] = MODES[mode]
-        if self._observed:
-            self._row[COLUMN.pilot_mode] = MODES[mode]
+        self._observed = False
 
     @property
     def aids(self) -> tuple[SwitchName, ...]:
@@ -297,7 +294,7 @@ class Simulation:
             on: Begins; else ends.
         """
         self._observe()
-        airspeed = float(self._row[COLUMN.airspeed_kt]) * KNOT
+        airspeed = float(self._scratch.si[QUANTITY.airspeed])
         state, frequency = self._state, self.tables.nacelle.frequency
         change = fault_change(fault, on=on, time=self.time)
         interpreted(fault_apply)(state.faults, change, state.x, state.nacelle, frequency, airspeed)
@@ -373,18 +370,17 @@ class Simulation:
             self.laws.restore(snapshot.laws)
         self._observed = False
 
-    def _observe(self) -> FloatArray:
+    def _observe(self) -> None:
         if not self._observed:
             self.flying.do(OBSERVE)
             self._observed = True
-        return self._row
 
 
 def sensors_of(values: FloatArray) -> Sensors:
     """Sensor values as laws and pilots see them.
 
     Args:
-        values: In the order of ``Sensors``, shape (SENSOR_COUNT,), booleans as numbers.
+        values: In the order of ``Sensors``, shape (SENSOR.size,), booleans as numbers.
     """
     numbers: list[Any] = values.tolist()
     numbers[-2:] = (numbers[-2] != 0.0, numbers[-1] != 0.0)  # the last two are booleans

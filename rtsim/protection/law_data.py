@@ -8,12 +8,6 @@ from rtsim.protection.prediction_kernels import CELL_SIZE, ROLL_OUT_SIZE, Bounda
 
 LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
 
-# Places in the sensor array, the order of rtsim.command.Sensors. SI and radians, booleans as 0 and 1.
-SENSE_TIME, SENSE_AIRSPEED, SENSE_AIRSPEED_RATE, SENSE_NACELLE, SENSE_NACELLE_RATE = 0, 1, 2, 3, 4
-SENSE_PITCH, SENSE_PITCH_RATE, SENSE_FLIGHT_PATH, SENSE_ALTITUDE, SENSE_CLIMB_RATE = 5, 6, 7, 8, 9
-SENSE_LOAD_FACTOR, SENSE_TORQUE, SENSE_FLAPPING, SENSE_DOWNSTOP, SENSE_NACELLE_OK = 10, 11, 12, 13, 14
-SENSOR_COUNT = 15
-
 # Reasons, as recorded: 0 none, else one more than the number of the limit in rtsim.protection.limits.LIMIT_KINDS.
 REASON_NONE, REASON_LOW, REASON_HIGH, REASON_GATE = 0, 1, 2, 3
 REASON_FLAP, REASON_TORQUE, REASON_PITCH, REASON_SINK = 6, 7, 9, 11

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from rtsim.command import SENSOR
 from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
@@ -51,17 +52,6 @@ from rtsim.protection.law_data import (
     LAW_FULL,
     LAW_GOVERNOR,
     LAW_OFF,
-    SENSE_AIRSPEED,
-    SENSE_AIRSPEED_RATE,
-    SENSE_ALTITUDE,
-    SENSE_CLIMB_RATE,
-    SENSE_FLAPPING,
-    SENSE_NACELLE,
-    SENSE_NACELLE_OK,
-    SENSE_NACELLE_RATE,
-    SENSE_PITCH,
-    SENSE_PITCH_RATE,
-    SENSE_TORQUE,
     ProtectionTables,
 )
 from rtsim.protection.limiter_kernels import allowed_sink as allowed_sink  # noqa: PLC0414
@@ -136,10 +126,10 @@ def _look_ahead(
     cell = work[: model.CELL_SIZE]
     out = work[2 * model.CELL_SIZE : 2 * model.CELL_SIZE + model.ROLL_OUT_SIZE]
     dt = settings.period
-    airspeed, angle, rate = sensors[SENSE_AIRSPEED], sensors[SENSE_NACELLE], sensors[SENSE_NACELLE_RATE]
-    pitch, climb = sensors[SENSE_PITCH], sensors[SENSE_CLIMB_RATE]
+    airspeed, angle, rate = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], sensors[SENSOR.nacelle_rate]
+    pitch, climb = sensors[SENSOR.pitch], sensors[SENSOR.climb_rate]
     sine, cosine = math.sin(pitch), math.cos(pitch)
-    z = (airspeed * cosine + climb * sine, airspeed * sine - climb * cosine, sensors[SENSE_PITCH_RATE], pitch)
+    z = (airspeed * cosine + climb * sine, airspeed * sine - climb * cosine, sensors[SENSOR.pitch_rate], pitch)
     asked = (clip(command[0], -1.0, 1.0), clip(command[1], 0.0, 1.0))
     if state[L_STARTED] == 0.0:
         state[L_ACTED_STICK], state[L_ACTED_LEVER], state[L_ACTED_RATE] = asked[0], asked[1], 0.0
@@ -149,7 +139,7 @@ def _look_ahead(
     model_at(tables.model, airspeed, angle, cell)
 
     _, _, _, expected, _ = accelerations(cell, z, acting, (0.0, rate))
-    missing = clip(sensors[SENSE_AIRSPEED_RATE] - expected, -settings.bias_limit, settings.bias_limit)
+    missing = clip(sensors[SENSOR.airspeed_rate] - expected, -settings.bias_limit, settings.bias_limit)
     state[L_BIAS] += dt / settings.bias_filter * (missing - state[L_BIAS])
     bias = (state[L_BIAS], settings.bias_decay)
     # The filter's command angle follows from its motion: n'' = w^2 (c - n) - 2 w n'.
@@ -158,11 +148,11 @@ def _look_ahead(
     state[L_LAST_NACELLE_RATE] = rate
     commanded = clip(angle + (2.0 * rate + turning / w) / w, tables.model.forward_stop, tables.model.aft_stop)
     nacelle = (commanded, angle, rate)
-    if sensors[SENSE_NACELLE_OK] == 0.0:
+    if sensors[SENSOR.nacelle_ok] == 0.0:
         nacelle = (angle, angle, 0.0)
 
     horizon = settings.warning_horizon
-    held = state[L_ACTED_RATE] if sensors[SENSE_NACELLE_OK] != 0.0 else 0.0
+    held = state[L_ACTED_RATE] if sensors[SENSOR.nacelle_ok] != 0.0 else 0.0
     time, guard = (settings.warning_step, horizon), (settings.pitch, settings.pitch_frequency)
     roll_out(tables.model, tables.corridor, cell, z, acting, nacelle, (held, horizon), bias, time, guard, out)
     state[L_TIME], state[L_SIDE] = out[model.OUT_TIME], out[model.OUT_SIDE]
@@ -173,7 +163,7 @@ def _look_ahead(
 
 @inner_kernel
 def _remember(state: FloatArray, sensors: FloatArray) -> None:
-    state[L_LAST_TORQUE] = sensors[SENSE_TORQUE]
+    state[L_LAST_TORQUE] = sensors[SENSOR.mast_torque]
     state[L_STARTED] = 1.0
 
 
@@ -186,7 +176,7 @@ def law_watch(
     Args:
         tables: The law.
         state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        sensors: What the law may know, shape (SENSOR_COUNT,).
+        sensors: What the law may know, shape (SENSOR.size,).
         command: Stick, lever, nacelle rate [rad/s] that would act without the law.
         work: Scratch of WORK_SIZE numbers.
     """
@@ -204,7 +194,7 @@ def law_decide(
     Args:
         tables: The law.
         state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        sensors: What the law may know, shape (SENSOR_COUNT,).
+        sensors: What the law may know, shape (SENSOR.size,).
         command: Stick, lever, nacelle rate [rad/s] that would act without the law.
         work: Scratch of WORK_SIZE numbers.
     """
@@ -214,16 +204,16 @@ def law_decide(
     cell, target = work[: model.CELL_SIZE], work[model.CELL_SIZE : 2 * model.CELL_SIZE]
     out = work[2 * model.CELL_SIZE : 2 * model.CELL_SIZE + model.ROLL_OUT_SIZE]
     acting = (state[L_ACTED_STICK], state[L_ACTED_LEVER])
-    airspeed, angle, rate = sensors[SENSE_AIRSPEED], sensors[SENSE_NACELLE], sensors[SENSE_NACELLE_RATE]
+    airspeed, angle, rate = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], sensors[SENSOR.nacelle_rate]
     if tables.law == LAW_GOVERNOR:
         govern(tables, state, cell, z, (asked, asked), nacelle, command[2], out)
     elif tables.law == LAW_FULL:
         govern(tables, state, cell, z, (acting, asked), nacelle, command[2], out)
-        flight = (airspeed, angle, sensors[SENSE_CLIMB_RATE])
+        flight = (airspeed, angle, sensors[SENSOR.climb_rate])
         scratch = (cell, target, out)
-        blend_recovery(tables, state, scratch, z, asked, nacelle, command[2], flight, sensors[SENSE_ALTITUDE])
-        limit_stick(tables, state, cell, z, acting, rate, sensors[SENSE_FLAPPING])
-        limit_lever(tables, state, cell, sensors[SENSE_TORQUE], airspeed, angle)
+        blend_recovery(tables, state, scratch, z, asked, nacelle, command[2], flight, sensors[SENSOR.altitude])
+        limit_stick(tables, state, cell, z, acting, rate, sensors[SENSOR.flapping])
+        limit_lever(tables, state, cell, sensors[SENSOR.mast_torque], airspeed, angle)
     _remember(state, sensors)
 
 

@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rtsim.choices import CorridorName
-from rtsim.command import Command, Sensors
+from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor import LEVEL_NAMES
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
 from rtsim.protection.boundary import load_boundary, model_corridor
-from rtsim.protection.law_data import SENSOR_COUNT
 from rtsim.protection.limits import LIMIT_KINDS, load_limits, protection_data
 from rtsim.protection.monitor_kernels import KIND_COUNT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
-from rtsim.units import DEGREE, INCH_POUND, KNOT
+from rtsim.units import DEGREE, KNOT
 
 WATCHED = (*LIMIT_KINDS, "time_to_limit")
 """What has a margin and a level, in the order of the arrays."""
+SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
+"""Quantities of the frame that sensors show under another name."""
 UNIT_SCALE = {"kn": KNOT, "deg": DEGREE, "deg/s": DEGREE, "%": 0.01, "": 1.0, "m/s": 1.0, "s": 1.0}
 """SI value of one unit of the levels' data."""
 
@@ -196,7 +196,7 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
 
 
 def sensor_array(sensors: Sensors) -> FloatArray:
-    """Sensor values as the kernels take them (SENSOR_COUNT,).
+    """Sensor values as the kernels take them, shape (SENSOR.size,).
 
     Args:
         sensors: The sensor values.
@@ -205,30 +205,15 @@ def sensor_array(sensors: Sensors) -> FloatArray:
 
 
 def sensors_of_rows(rows: FloatArray) -> FloatArray:
-    """Sensor values of a frame history (frames, SENSOR_COUNT).
+    """Sensor values of a frame history (frames).
 
     Args:
         rows: Frame history (frames, SIGNAL_COUNT).
     """
-    columns: tuple[tuple[Any, float], ...] = (
-        (COLUMN.time_s, 1.0),
-        (COLUMN.airspeed_kt, KNOT),
-        (COLUMN.airspeed_rate_kt_s, KNOT),
-        (COLUMN.nacelle_deg, DEGREE),
-        (COLUMN.nacelle_rate_deg_s, DEGREE),
-        (COLUMN.pitch_deg, DEGREE),
-        (COLUMN.pitch_rate_deg_s, DEGREE),
-        (COLUMN.flight_path_deg, DEGREE),
-        (COLUMN.altitude_m, 1.0),
-        (COLUMN.climb_rate_m_s, 1.0),
-        (COLUMN.load_factor, 1.0),
-        (COLUMN.mast_torque_inlb, INCH_POUND),
-        (COLUMN.flapping_deg, DEGREE),
-        (COLUMN.on_downstop, 1.0),
-    )
-    sensors = np.ones((len(rows), SENSOR_COUNT))
-    for place, (column, scale) in enumerate(columns):
-        sensors[:, place] = rows[:, column] * scale
+    places = [getattr(QUANTITY, SHOWN_AS.get(name, name)) for name in Sensors.__slots__ if name != "nacelle_ok"]
+    sensors = np.empty((len(rows), SENSOR.size))
+    sensors[:, : len(places)] = rows[:, places] * UNIT_SCALES[places]
+    sensors[:, SENSOR.nacelle_ok] = rows[:, COLUMN.failures].astype(np.int64) & NACELLES_JAMMED == 0
     return sensors
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
@@ -15,16 +16,6 @@ from rtsim.protection.law_data import (
     L_TIME,
     LAW_MONITOR,
     LAW_STATE_SIZE,
-    SENSE_AIRSPEED,
-    SENSE_ALTITUDE,
-    SENSE_CLIMB_RATE,
-    SENSE_DOWNSTOP,
-    SENSE_FLAPPING,
-    SENSE_LOAD_FACTOR,
-    SENSE_NACELLE,
-    SENSE_NACELLE_RATE,
-    SENSE_PITCH,
-    SENSE_TORQUE,
     WORK_SIZE,
     ProtectionTables,
     SinkTables,
@@ -91,22 +82,22 @@ def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: flo
         time_to_limit: Predicted time to the corridor's boundary [s].
         out: Written, shape (KIND_COUNT,): m/s for speeds, rad and rad/s for angles, share of the limit for torque.
     """
-    airspeed, angle = sensors[SENSE_AIRSPEED], sensors[SENSE_NACELLE]
+    airspeed, angle = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle]
     low, high = speed_range(tables.chart, angle)
     out[KIND_STALL] = airspeed - low
     out[KIND_LOAD] = high - airspeed
     # On the downstop the gate is closed, margin negative, while leaving it would be over the limit off it.
-    out[KIND_GATE] = tables.chart.high[0] - airspeed if sensors[SENSE_DOWNSTOP] != 0.0 else FAR
+    out[KIND_GATE] = tables.chart.high[0] - airspeed if sensors[SENSOR.on_downstop] != 0.0 else FAR
     out[KIND_RANGE] = min(angle - tables.nacelle_forward, tables.nacelle_aft - angle)
-    out[KIND_RATE] = tables.nacelle_rate - abs(sensors[SENSE_NACELLE_RATE])
-    out[KIND_FLAP] = tables.flapping - abs(sensors[SENSE_FLAPPING])
-    out[KIND_TORQUE] = 1.0 - sensors[SENSE_TORQUE] / torque_limit(tables.torque, airspeed, angle)
-    nz = sensors[SENSE_LOAD_FACTOR]
+    out[KIND_RATE] = tables.nacelle_rate - abs(sensors[SENSOR.nacelle_rate])
+    out[KIND_FLAP] = tables.flapping - abs(sensors[SENSOR.flapping])
+    out[KIND_TORQUE] = 1.0 - sensors[SENSOR.mast_torque] / torque_limit(tables.torque, airspeed, angle)
+    nz = sensors[SENSOR.load_factor]
     out[KIND_NZ] = min(tables.load_factor_max - nz, nz - tables.load_factor_min)
-    out[KIND_PITCH] = tables.pitch - abs(sensors[SENSE_PITCH])
+    out[KIND_PITCH] = tables.pitch - abs(sensors[SENSOR.pitch])
     low, high = speed_range(tables.plant, angle)
     out[KIND_CONSISTENCY] = min(airspeed - low, high - airspeed)
-    out[KIND_SINK] = allowed_sink(tables.sink, airspeed, sensors[SENSE_ALTITUDE]) + sensors[SENSE_CLIMB_RATE]
+    out[KIND_SINK] = allowed_sink(tables.sink, airspeed, sensors[SENSOR.altitude]) + sensors[SENSOR.climb_rate]
     out[KIND_TIME] = time_to_limit
 
 
@@ -195,7 +186,7 @@ def watch(
 
     Args:
         tables: Limits and levels.
-        sensors: One row per frame (frames, SENSOR_COUNT).
+        sensors: One row per frame, shape (frames, SENSOR.size).
         time_to_limit: One per frame (frames,) [s].
         dt: Length of a frame [s].
         state: Of the levels, updated in place, zeros at the start of a flight (LEVEL_STATE_SIZE,).
@@ -213,11 +204,11 @@ def distances(tables: MonitorTables, sensors: FloatArray, distance: FloatArray) 
 
     Args:
         tables: The corridor.
-        sensors: One row per frame (frames, SENSOR_COUNT).
+        sensors: One row per frame, shape (frames, SENSOR.size).
         distance: Written (frames,).
     """
     for k in range(sensors.shape[0]):
-        distance[k] = normalized_distance(tables, sensors[k, SENSE_AIRSPEED], sensors[k, SENSE_NACELLE])
+        distance[k] = normalized_distance(tables, sensors[k, SENSOR.airspeed], sensors[k, SENSOR.nacelle_angle])
 
 
 @kernel
@@ -228,7 +219,7 @@ def predict(
 
     Args:
         tables: A law's tables; whatever the law, nothing is limited here.
-        sensors: One row per frame (frames, SENSOR_COUNT).
+        sensors: One row per frame, shape (frames, SENSOR.size).
         acting: Stick, lever, nacelle rate [rad/s] that acted (frames, 3).
         time_to_limit: Written (frames,) [s].
         side: Written: -1 low, 1 high, 0 none within the horizon (frames,).

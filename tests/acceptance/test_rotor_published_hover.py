@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from rtsim.aircraft.xv15.model import Xv15, rotor_kernels
+from rtsim.aircraft.xv15 import rotor_kernels
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import FOOT, HORSEPOWER, POUND_FORCE, deg
 
 DATA = tomllib.loads((Path(__file__).parents[1] / "data" / "xv15_validation.toml").read_text())

@@ -18,7 +18,7 @@ from scenarios.files.loader import load_scenario
 from scenarios.files.options import Overrides
 from scenarios.flight.replay import replay_log
 from scenarios.flight.runner import FlightOutputs
-from scenarios.verdicts.tester import Tester
+from scenarios.verdicts import tester
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_another_aircraft_flies_another_flight_and_replays(files: Path, tmp_path
 def test_a_trial_flies_the_database_it_is_given(files: Path) -> None:
     scenario = load_scenario("ep04_wrong_nacelle_command")
     hashes = [
-        Tester(law="full", **changes).run(scenario).flight.history_sha256
+        tester.Tester(law="full", **changes).run(scenario).flight.history_sha256
         for changes in ({}, {"database": str(files / "same.nc")}, {"database": str(files / "weak.nc")})
     ]
     assert hashes[0] == hashes[1]

@@ -17,7 +17,8 @@ from scipy.interpolate import CubicHermiteSpline
 from rtsim.aircraft import INPUT, INPUTS, STATE, STATES, Condition
 from rtsim.aircraft.variables import FLAP_INPUTS
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
-from rtsim.aircraft.xv15.model import Xv15, rotor_kernels
+from rtsim.aircraft.xv15 import rotor_kernels
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import GRAVITY, KNOT, deg
 
 AIRCRAFT = Xv15.load()

@@ -10,8 +10,9 @@ from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.table_kernels import curve, surface
 from rtsim.aircraft.xv15 import airframe_kernels as airframe
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
+from rtsim.aircraft.xv15 import tail_kernels
 from rtsim.aircraft.xv15.data_reader import read_data
-from rtsim.aircraft.xv15.model import Xv15, tail_kernels
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import DEGREE, FOOT, GRAVITY, INCH, SLUG_FOOT_SQUARED, deg, kt, to_deg
 
 AIRCRAFT = Xv15.load()

@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from rtsim.command import SENSOR
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.aircraft import load_aircraft
@@ -33,16 +34,16 @@ class Bench:
         self.tables = tables
         self.state = np.zeros(data.LAW_STATE_SIZE)
         kernels.law_start(tables, self.state)
-        self.sensors = np.zeros(data.SENSOR_COUNT)
-        self.sensors[data.SENSE_AIRSPEED] = kt(airspeed_kt)
-        self.sensors[data.SENSE_NACELLE] = deg(nacelle_deg)
-        self.sensors[data.SENSE_PITCH] = point.x[3]
-        self.sensors[data.SENSE_ALTITUDE] = 200.0
-        self.sensors[data.SENSE_LOAD_FACTOR] = 1.0
-        self.sensors[data.SENSE_TORQUE] = point.y[1]
-        self.sensors[data.SENSE_FLAPPING] = np.hypot(point.x[7], point.x[9])
-        self.sensors[data.SENSE_DOWNSTOP] = float(nacelle_deg <= 0.5)
-        self.sensors[data.SENSE_NACELLE_OK] = 1.0
+        self.sensors = np.zeros(SENSOR.size)
+        self.sensors[SENSOR.airspeed] = kt(airspeed_kt)
+        self.sensors[SENSOR.nacelle_angle] = deg(nacelle_deg)
+        self.sensors[SENSOR.pitch] = point.x[3]
+        self.sensors[SENSOR.altitude] = 200.0
+        self.sensors[SENSOR.load_factor] = 1.0
+        self.sensors[SENSOR.mast_torque] = point.y[1]
+        self.sensors[SENSOR.flapping] = np.hypot(point.x[7], point.x[9])
+        self.sensors[SENSOR.on_downstop] = float(nacelle_deg <= 0.5)
+        self.sensors[SENSOR.nacelle_ok] = 1.0
         self.trim = np.array([point.u[0], point.u[1], 0.0])
         self.frame = 0
         self.work = np.zeros(data.WORK_SIZE)
@@ -94,7 +95,7 @@ def test_governor_holds_the_nacelles_before_the_low_side(tables):
 
 def test_governor_turns_the_nacelles_back_when_stopping_is_not_enough(tables):
     bench = Bench(tables["governor"], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 5.0)
-    bench.sensors[data.SENSE_AIRSPEED_RATE] = -kt(4.0)
+    bench.sensors[SENSOR.airspeed_rate] = -kt(4.0)
     moved = [bench.step(rate=-deg(7.5), frames=5)[2] for _ in range(40)]
     assert moved[-1] > deg(1.0)
     assert bench.state[data.L_KIND] == 1.0
@@ -121,14 +122,14 @@ def test_governor_leaves_stick_and_lever_alone(tables):
 def test_full_takes_over_before_the_low_side_and_gives_back(tables):
     """Slowing at 4 kn/s, 5 kn before the line: power and nose-down; once well inside, the pilot's command returns."""
     bench = Bench(tables["full"], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 5.0)
-    bench.sensors[data.SENSE_AIRSPEED_RATE] = -kt(4.0)
+    bench.sensors[SENSOR.airspeed_rate] = -kt(4.0)
     for _ in range(50):
         change = bench.step(lever=-0.1, frames=5)
     assert bench.state[data.L_BLEND] == 1.0
     assert change[1] > -0.1
     assert bench.cause("lever") == data.REASON_LOW
-    bench.sensors[data.SENSE_AIRSPEED] = kt(125.0)
-    bench.sensors[data.SENSE_AIRSPEED_RATE] = 0.0
+    bench.sensors[SENSOR.airspeed] = kt(125.0)
+    bench.sensors[SENSOR.airspeed_rate] = 0.0
     bench.step(frames=5)
     assert 0.9 < bench.state[data.L_BLEND] < 1.0
     np.testing.assert_array_equal(bench.step(frames=700), [0.0, 0.0, 0.0])
@@ -137,7 +138,7 @@ def test_full_takes_over_before_the_low_side_and_gives_back(tables):
 
 def test_full_reduces_power_before_the_high_side(tables):
     bench = Bench(tables["full"], 167.0, 5.0)
-    bench.sensors[data.SENSE_AIRSPEED_RATE] = kt(4.0)
+    bench.sensors[SENSOR.airspeed_rate] = kt(4.0)
     for _ in range(4):  # no longer: the torque shown here does not follow the lever, which the torque limit answers
         change = bench.step(frames=5)
     assert bench.state[data.L_BLEND] > 0.2
@@ -148,23 +149,23 @@ def test_full_reduces_power_before_the_high_side(tables):
 def test_full_leaves_the_hands_alone_near_the_ground(tables):
     """Below the height floor only nacelles, torque, flapping and pitch are protected."""
     bench = Bench(tables["full"], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 1.0)
-    bench.sensors[data.SENSE_ALTITUDE] = 9.0
+    bench.sensors[SENSOR.altitude] = 9.0
     bench.step(frames=100)
     assert bench.state[data.L_BLEND] == 0.0
-    bench.sensors[data.SENSE_ALTITUDE] = 40.0
+    bench.sensors[SENSOR.altitude] = 40.0
     bench.step(frames=100)
     assert bench.state[data.L_BLEND] > 0.2
 
 
 def test_full_stops_a_descent_that_is_too_steep(tables):
     bench = Bench(tables["full"], 105.0, 50.0)
-    bench.sensors[data.SENSE_CLIMB_RATE] = -12.0
+    bench.sensors[SENSOR.climb_rate] = -12.0
     bench.step(frames=100)
     assert bench.state[data.L_BLEND] == 1.0
     assert bench.state[data.L_BLEND_REASON] == data.REASON_SINK
     high = Bench(tables["full"], 105.0, 50.0)
-    high.sensors[data.SENSE_CLIMB_RATE] = -12.0
-    high.sensors[data.SENSE_ALTITUDE] = 1500.0
+    high.sensors[SENSOR.climb_rate] = -12.0
+    high.sensors[SENSOR.altitude] = 1500.0
     high.step(frames=100)
     assert high.state[data.L_BLEND] == 0.0
 
@@ -172,11 +173,11 @@ def test_full_stops_a_descent_that_is_too_steep(tables):
 def test_full_keeps_the_mast_torque(tables):
     """Measured at the limit, the lever goes no further; above it, the lever comes back."""
     bench = Bench(tables["full"], 105.0, 50.0)
-    bench.sensors[data.SENSE_TORQUE] = bench.tables.settings.torque_share * 130000.0 * INCH_POUND
+    bench.sensors[SENSOR.mast_torque] = bench.tables.settings.torque_share * 130000.0 * INCH_POUND
     bench.step(frames=5)
     assert bench.step(lever=0.2, frames=100)[1] == pytest.approx(0.0, abs=2e-3)
     assert bench.cause("lever") == data.REASON_TORQUE
-    bench.sensors[data.SENSE_TORQUE] = 1.1 * 130000.0 * INCH_POUND
+    bench.sensors[SENSOR.mast_torque] = 1.1 * 130000.0 * INCH_POUND
     assert bench.step(lever=0.2, frames=100)[1] < -0.005
 
 
@@ -199,8 +200,8 @@ def test_full_keeps_the_flapping(tables):
 
 def test_full_keeps_the_pitch_attitude(tables):
     bench = Bench(tables["full"], 105.0, 50.0)
-    bench.sensors[data.SENSE_PITCH] = deg(20.0)
-    bench.sensors[data.SENSE_PITCH_RATE] = deg(12.0)
+    bench.sensors[SENSOR.pitch] = deg(20.0)
+    bench.sensors[SENSOR.pitch_rate] = deg(12.0)
     change = bench.step(stick=-0.5, frames=5)
     assert change[0] > -0.5
     assert bench.cause("stick") in {data.REASON_PITCH, data.REASON_LOW}
@@ -212,7 +213,7 @@ def applied_lever(bench, change):
 
 
 @pytest.mark.parametrize("law", ["monitor", "governor", "full"])
-@pytest.mark.parametrize("place", [data.SENSE_AIRSPEED, data.SENSE_PITCH, data.SENSE_TORQUE])
+@pytest.mark.parametrize("place", [SENSOR.airspeed, SENSOR.pitch, SENSOR.mast_torque])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_a_law_that_cannot_see_does_not_act_and_recovers(tables, law, place, value):
     bench = Bench(tables[law], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 2.0)
@@ -252,7 +253,7 @@ def test_a_jammed_nacelle_is_not_predicted_to_move(tables):
     low = CORRIDOR.low_speed(deg(50.0)) / kt(1.0)
     for healthy in (True, False):
         bench = Bench(tables["monitor"], low + 8.0)
-        bench.sensors[data.SENSE_NACELLE_OK] = float(healthy)
+        bench.sensors[SENSOR.nacelle_ok] = float(healthy)
         bench.step(rate=-deg(7.5), frames=50)
         assert bool(bench.state[data.L_SIDE] == -1.0) == healthy
 

@@ -8,13 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from rtsim.command import Command, Sensors
+from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor import load_corridor
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
-from rtsim.protection.law_data import SENSOR_COUNT
 from rtsim.protection.limits import LIMIT_KINDS
 from rtsim.protection.monitor import WATCHED, MarginHistory, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
@@ -175,7 +174,7 @@ def test_history_equals_the_monitor_in_flight(monitor):
 
 def test_sensor_values_keep_the_order_of_the_sensors():
     values = sensor_array(CALM)
-    assert len(values) == SENSOR_COUNT == len(Sensors.__slots__)
+    assert len(values) == SENSOR.size == len(Sensors.__slots__)
     assert values[1] == CALM.airspeed
     assert values[13] == 0.0
     assert values[14] == 1.0
