@@ -19,6 +19,7 @@ from rtsim.cli.main import build_app
 from rtsim.errors import InputError
 from rtsim.loop.options import FlightOptions, Option, declared
 from rtsim.loop.setup import FlightSetup
+from rtsim.lpv.files.netcdf import SHIPPED
 from rtsim.programme import Programme
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.spec import CLASS_OPTIONS, FILE_OPTIONS, parse_campaign
@@ -41,7 +42,7 @@ def another(item: Option) -> Any:
     if item.kind is bool:
         return not item.default
     if item.kind is str:
-        return "/tmp/mine.nc" if item.is_file else "mine:Own"
+        return str(SHIPPED) if item.is_file else "mine:Own"
     value = item.shown(item.default) + 0.5 * ((100.0 if item.high is None else item.high) - item.shown(item.default))
     return item.kind(value)
 
