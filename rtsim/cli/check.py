@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -39,12 +39,7 @@ def check_command(
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Validate scenario and campaign files, stick maps, databases; every mistake is one sentence, exit 2 for any.
-
-    Args:
-        files: What to check.
-        json: Print one JSON object on stdout.
-    """
+    """Validate scenario and campaign files, stick maps, databases; every mistake is one sentence, exit 2 for any."""
     findings = {name: file_problems(name) for name in files}
     for name, problems in findings.items():
         for problem in problems:
@@ -157,7 +152,8 @@ def check_profile(database: Database) -> None:
     from rtsim.aircraft.controls import control_tables
     from rtsim.atmosphere import CALM
     from rtsim.atmosphere.air import gust_tables
-    from rtsim.corridor import CORRIDOR_NAMES, load_corridor
+    from rtsim.choices import ChartName
+    from rtsim.corridor import load_corridor
     from rtsim.faults.schedule import fault_tables
     from rtsim.nacelle import load_nacelle_tables
     from rtsim.optimization.paths import conversion_end_kt
@@ -169,7 +165,7 @@ def check_profile(database: Database) -> None:
     profile = database.profile
     for read in (control_tables, load_nacelle_tables, load_levels, load_flap_tables, load_drive_tables, pilot_settings):
         read(profile)
-    for name in CORRIDOR_NAMES:
+    for name in get_args(ChartName):
         load_corridor(name, profile)
     gust_tables(CALM, profile)
     fault_tables((), profile)

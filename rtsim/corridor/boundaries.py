@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +18,6 @@ from rtsim.units import deg, kt
 if TYPE_CHECKING:
     from rtsim.corridor.corridor_kernels import CorridorTables
 
-CorridorName = Literal["design", "flight"]
-CORRIDOR_NAMES: tuple[CorridorName, ...] = ("design", "flight")
 LEVEL_NAMES = ("clear", "caution", "warning", "exceedance")
 """Words for the levels 0 to 3 of ``corridor_level``."""
 
@@ -178,10 +176,11 @@ def load_corridor(name: str = "design", profile: AircraftProfile | None = None) 
     Raises:
         InputError: There is no such corridor, or a value is missing or out of range.
     """
-    if name not in CORRIDOR_NAMES:
-        raise InputError("no such corridor", key="corridor", value=name, allowed=", ".join(CORRIDOR_NAMES))
     part = (xv15_profile() if profile is None else profile).corridor
-    entry, levels, downstop = part.table("corridor").table(name), part.table("levels"), part.table("downstop")
+    named, levels, downstop = part.table("corridor"), part.table("levels"), part.table("downstop")
+    if not named.has(name):
+        raise InputError("no such corridor", key="corridor", value=name, allowed=", ".join(named.data))
+    entry = named.table(name)
     sources = part.table("sources").data if part.has("sources") else {}
     threshold = levels.numbers("threshold_kn", low=-100.0, high=200.0, count=3)
     return Corridor(

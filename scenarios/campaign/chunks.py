@@ -11,15 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
+from rtsim.choices import CorridorName
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
-from rtsim.protection.boundary import BoundaryName
+from rtsim.loop.options import FlightOptions
+from rtsim.lpv.files.storage import load_database
 from rtsim.protection.laws import LawSpec, load_laws
 from rtsim.protection.tables import LAW_NAMES
 from rtsim.units import kt
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.spec import CampaignFile, parse_campaign
-from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
+from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
 from scenarios.campaign.trial_kernels import METRIC_COUNT
 
 CHUNK_RUNS = 10
@@ -58,16 +60,12 @@ class Task:
     """Laws, each flown on every run."""
     seed: int
     """The campaign's seed."""
-    plant: str
-    """Aircraft model."""
-    rate_hz: int
-    """Frames per second."""
+    options: FlightOptions
+    """What all flights have in common."""
     folder: str = ""
     """Where modules of laws are looked for besides the installed ones."""
-    database: str = ""
-    """LPV database of the aircraft, a file; empty: the shipped XV-15."""
     aircraft_hash: str = ""
-    """Hash of that aircraft, which a worker must have too."""
+    """Hash of the aircraft, which a worker must have too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,22 +121,14 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
         InputError: This worker has another aircraft.
     """
     spec = _spec(task.text, task.file)
-    bench = _bench(task.plant, spec.corridor, task.rate_hz, task.database)
-    if task.aircraft_hash != bench.aircraft_hash:
-        raise InputError(
-            "a worker has another aircraft than the campaign",
-            file=task.database or None,
-            key="database",
-            value=bench.aircraft_hash[:12],
-            allowed=task.aircraft_hash[:12],
-            mend="give every worker the same database, profile and version of rtsim",
-        )
+    _refuse_another(task)
+    bench = Bench()
     metrics = np.zeros((chunk.count, len(task.laws), METRIC_COUNT))
     seconds = np.zeros(len(task.laws))
     problems: list[tuple[int, int, str]] = []
     for k in range(chunk.count):
         run = chunk.first + k
-        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run, database=task.database)
+        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run, options=task.options)
         for number, law in enumerate(task.laws):
             begin = time.process_time()
             # The first run of every class asks laws in Python everything twice.
@@ -165,13 +155,15 @@ def fly_law(
     if law.compiled:
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
-        return bench.fly(plan, _python_laws(law.name, folder, bench.corridor, bench.database), repeat=repeat, keep=keep)
+        options = plan.setup.options
+        laws = _python_laws(law.name, folder, options.corridor or TRIAL_CORRIDOR, options.database)
+        return bench.fly(plan, laws, repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
 
 
-def law_chain(name: str, folder: str, boundary: BoundaryName = "flight", database: str = "") -> Sequence[LawSpec]:
+def law_chain(name: str, folder: str, boundary: CorridorName = "flight", database: str = "") -> Sequence[LawSpec]:
     """Find a law, or several separated by commas.
 
     Args:
@@ -191,7 +183,7 @@ def law_chain(name: str, folder: str, boundary: BoundaryName = "flight", databas
 
 
 @functools.lru_cache(maxsize=8)
-def _python_laws(name: str, folder: str, boundary: BoundaryName, database: str) -> Sequence[LawSpec]:
+def _python_laws(name: str, folder: str, boundary: CorridorName, database: str) -> Sequence[LawSpec]:
     return law_chain(name, folder, boundary, database)
 
 
@@ -203,15 +195,24 @@ def _spec(text: str, file: str) -> CampaignFile:
     return spec
 
 
-@functools.lru_cache(maxsize=4)
-def _bench(plant: str, corridor: str, rate_hz: int, database: str) -> Bench:
+def _refuse_another(task: Task) -> None:
+    """Refuse to fly where the aircraft is another than the campaign's."""
     log = logging.getLogger("rtsim.lpv.files.storage")
-    level = log.level
+    level, database = log.level, task.options.database
     log.setLevel(logging.ERROR)  # what the aircraft borrows was said where the campaign was started
     try:
-        return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz, database=database)  # type: ignore[arg-type]  # checked
+        present = load_database(database or None).aircraft_hash
     finally:
         log.setLevel(level)
+    if task.aircraft_hash != present:
+        raise InputError(
+            "a worker has another aircraft than the campaign",
+            file=database or None,
+            key="database",
+            value=present[:12],
+            allowed=task.aircraft_hash[:12],
+            mend="give every worker the same database, profile and version of rtsim",
+        )
 
 
 def present_folder() -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+from typing import Any
 
 import numpy as np
 
@@ -10,13 +12,16 @@ from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.faults import Fault
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
+from rtsim.loop.setup import FlightSetup
 from rtsim.lpv.files.storage import load_database
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
 from rtsim.units import deg, kt
-from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
+from scenarios.campaign.spec import CLASS_OPTIONS, CampaignFile, ClassTable, Generator, PulseDraw, draw
 from scenarios.campaign.trial import FlightPlan, has_trim
 from scenarios.files.loader import load_scenario
 
@@ -24,7 +29,9 @@ ATTEMPTS = 200
 """Starts drawn before a class is said to have none inside the corridor."""
 
 
-def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int, database: str = "") -> FlightPlan:
+def draw_plan(
+    spec: CampaignFile, *, seed: int, class_number: int, run: int, options: FlightOptions | None = None
+) -> FlightPlan:
     """Draw one flight.
 
     Args:
@@ -32,20 +39,21 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int, dat
         seed: Its seed.
         class_number: Place of the class in the campaign.
         run: Number of the run within the class.
-        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
+        options: What all flights have in common; None: what the campaign's file says.
 
     Raises:
         InputError: No start of the class lies inside the corridor.
     """
     item = spec.classes[class_number]
+    common = options or FlightOptions(**given(spec))
     generator = stream_generator(seed, STREAM_CAMPAIGN, class_number, run)
     if item.scenarios:
         scenario = load_scenario(item.scenarios[int(generator.integers(len(item.scenarios)))])
         programme, start = scenario.programme, scenario.start
         duration = scenario.duration if item.duration_s is None else item.duration_s
     else:
-        corridor = load_boundary(spec.corridor, load_database(database or None))
-        start = _start(item, corridor, database, generator)
+        corridor = load_boundary(spec.corridor, load_database(common.database or None))
+        start = _start(item, corridor, common.database, generator)
         programme = _programme(item, start, corridor, generator)
         duration = spec.duration_s if item.duration_s is None else item.duration_s
     pulses = tuple(pulse for table in item.pulses for pulse in _pulses(table, generator))
@@ -53,21 +61,30 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int, dat
     gusts = tuple(_gusts(item, generator))
     severity = draw(item.turbulence_kt, generator)
     turbulence = Turbulence(wind_at_20_ft=kt(severity)) if severity > 0.0 else None
-    wind = kt(draw(item.wind_kt, generator))
+    drawn = _options(item, generator)
     yields = generator.random() < item.pilot.yields
     reaction = draw(item.pilot.reaction_s, generator)
-    return FlightPlan(
+    drawn |= {"pilot_noise": item.pilot.noise, "seed": int(generator.integers(2**62))}
+    setup = FlightSetup(
         programme=programme,
+        options=dataclasses.replace(common, **drawn),
         start=start,
-        duration=duration,
-        pulses=pulses,
-        reaction=reaction if yields else None,
         air=AirSpecification(turbulence=turbulence, gusts=gusts),
         faults=faults,
-        wind=wind,
-        pilot_noise=item.pilot.noise,
-        seed=int(generator.integers(2**62)),
+        pulses=pulses,
+        reaction=reaction if yields else None,
     )
+    return FlightPlan(setup, duration)
+
+
+def _options(item: ClassTable, generator: Generator) -> dict[str, Any]:
+    """Options that a class gives, in the order in which they are declared; numbers are drawn."""
+    values = {option: getattr(item, option.key) for option in CLASS_OPTIONS}
+    return {
+        option.name: option.inside(draw(value, generator) if option.is_number else value)
+        for option, value in values.items()
+        if value is not None
+    }
 
 
 def _start(item: ClassTable, corridor: Corridor, database: str, generator: Generator) -> ProgrammePoint:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ import numpy as np
 
 import rtsim
 from rtsim.errors import InputError
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
 from scenarios.campaign.chunks import (
     ChunkResult,
@@ -46,12 +48,8 @@ class CampaignOptions:
     """Runs of every class; None: the file's."""
     seed: int = 0
     """Seed of every draw."""
-    plant: str | None = None
-    """Aircraft model; None: the file's."""
-    rate_hz: int | None = None
-    """Frames per second; None: the file's."""
-    database: str = ""
-    """LPV database of the aircraft, a file; empty: the shipped XV-15."""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """Options of all flights instead of the file's, by field of ``FlightOptions``, SI."""
     early_stop: bool = True
     """End as soon as the verdict is certain."""
     folder: Path | None = None
@@ -96,11 +94,11 @@ class CampaignResult:
             "campaign": self.spec.name,
             "law": self.task.laws[0].label,
             "seed": self.task.seed,
-            "plant": self.task.plant,
-            "database": self.task.database,
+            "plant": self.task.options.plant,
+            "database": self.task.options.database,
             "database_hash": self.task.aircraft_hash,
-            "corridor_name": self.spec.corridor,
-            "rate_hz": self.task.rate_hz,
+            "corridor_name": self.task.options.corridor_name,
+            "rate_hz": self.task.options.rate_hz,
             "runs": flown,
             "runs_planned": sum(self.flights.planned),
             "flights": flown * len(self.flights.laws),
@@ -225,7 +223,7 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
         file: Where it came from.
 
     Raises:
-        InputError: A law does not exist, or the plant's name is wrong.
+        InputError: A law does not exist, or an option is out of range.
     """
     tested = options.law or spec.law
     against = spec.against if options.against is None else list(options.against)
@@ -246,16 +244,15 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
             key="--against",
             mend=f"add --against {unknown[0]}",
         )
+    flown = FlightOptions(**given(spec, file)).changed(options.changes)
     return Task(
         text=text,
         file=file,
         laws=(*laws, LawVariant("off")),
         seed=options.seed,
-        plant=options.plant or spec.plant,
-        rate_hz=options.rate_hz or spec.rate_hz,
+        options=flown,
         folder=folder,
-        database=options.database,
-        aircraft_hash=load_database(options.database or None).aircraft_hash,
+        aircraft_hash=load_database(flown.database or None).aircraft_hash,
     )
 
 
@@ -272,8 +269,8 @@ def identity(task: Task) -> dict[str, Any]:
         "laws": [law.label for law in task.laws],
         "law_code": _law_code(task.laws, task.folder),
         "seed": task.seed,
-        "plant": task.plant,
-        "rate_hz": task.rate_hz,
+        "plant": task.options.plant,
+        "rate_hz": task.options.rate_hz,
         "metrics": METRIC_COUNT,
         "database": task.aircraft_hash,
         "versions": versions() | {"rtsim": rtsim.__version__},

@@ -17,6 +17,7 @@ from rtsim.aids.aids_kernels import MAP_PITCH_DAMPING
 from rtsim.aircraft.profile import parse_profile, xv15_profile
 from rtsim.aircraft.variables import position
 from rtsim.errors import InputError
+from rtsim.loop.options import FlightOptions
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database, save_database
@@ -100,7 +101,7 @@ def test_it_is_optimized(folder: Path) -> None:
     assert run_search_value(problem) != run_search_value(shipped)
     file = folder / "best.toml"
     file.write_text(scenario_text(problem, path), encoding="utf-8")
-    assert load_scenario(file).database == str(folder / "two_thirds.nc")
+    assert load_scenario(file).options.database == str(folder / "two_thirds.nc")
     with pytest.raises(InputError, match="no such database file"):
         ConversionProblem(SearchSpec.model_validate({"flight": {"database": str(folder / "missing.nc")}}))
 
@@ -112,12 +113,14 @@ def run_search_value(problem: ConversionProblem) -> float:
 
 def test_campaigns_fly_it_and_refuse_another(folder: Path) -> None:
     own = str(folder / "two_thirds.nc")
-    task = Task(CAMPAIGN, "small.toml", (LawVariant("full"), LawVariant("off")), seed=0, plant="lpv", rate_hz=250)
+    task = Task(CAMPAIGN, "small.toml", (LawVariant("full"), LawVariant("off")), seed=0, options=FlightOptions())
     task = dataclasses.replace(task, aircraft_hash=load_database().aircraft_hash)
     shipped = fly_chunk(task, Chunk(0, 0, 2))
     with pytest.raises(InputError, match="another aircraft than the campaign"):
-        fly_chunk(dataclasses.replace(task, database=own), Chunk(0, 0, 2))
-    task = dataclasses.replace(task, database=own, aircraft_hash=load_database(own).aircraft_hash)
+        fly_chunk(dataclasses.replace(task, options=FlightOptions(database=own)), Chunk(0, 0, 2))
+    task = dataclasses.replace(
+        task, options=FlightOptions(database=own), aircraft_hash=load_database(own).aircraft_hash
+    )
     assert not np.array_equal(fly_chunk(task, Chunk(0, 0, 2)).metrics, shipped.metrics)
 
 

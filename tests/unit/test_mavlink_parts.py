@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from telemetry.exchange.child_process import child_environment
-from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, endpoints, read_signing_key, Ratings
+from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, Ratings, endpoints, read_signing_key
 from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
 from telemetry.mavlink.framing import SignatureCheck, frames, signature_time
 from telemetry.mavlink.notices import FLAP_SPEEDS
