@@ -23,10 +23,11 @@ import numpy as np
 
 from rtsim.aircraft.profile import OWN_SUFFIX, read_profile
 from rtsim.aircraft.variables import Variable
+from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import GRIDDED, Database, fill_invalid
 from rtsim.lpv.files.storage import load_database, save_database
-from rtsim.pilot.schedule import OUTER_LOOPS, OuterLoop, design_schedule
+from rtsim.pilot.schedule import design_schedule
 from rtsim.units import kt
 
 NAME = "two_thirds"
