@@ -23,6 +23,7 @@ from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
+from rtsim.loop import beside
 from rtsim.loop import frame_kernels as frames_of
 from rtsim.loop.data import (
     CHANNEL,
@@ -203,6 +204,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     Raises:
         InputError: The start has no trim.
     """
+    beside.start("nonlinear" if setup.plant == "nonlinear" else "lpv")
     loaded = load_database(setup.database or None)
     database = flown_database(loaded, setup.database or None)
     nonlinear = setup.plant == "nonlinear"
