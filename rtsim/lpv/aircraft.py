@@ -13,6 +13,8 @@ import numpy.typing as npt
 from rtsim.aircraft.points import TrimPoint
 from rtsim.errors import InputError, TrimError
 from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.packed import packed
+from rtsim.kernels.parts import entry_point
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
@@ -43,14 +45,16 @@ class LpvAircraft:
     tables: kernels.LpvTables = field(init=False, repr=False)
     """What the compiled kernels take."""
     _work: FloatArray = field(init=False, repr=False)
-    _path: FloatArray = field(init=False, repr=False)
+    _stepping: kernels.Stepping = field(init=False, repr=False)
+    _step: Callable[..., float] | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         """Pack the database for the kernels."""
         tables = prepare_tables(self.database, self.form, refresh=self.refresh)
         object.__setattr__(self, "tables", tables)
         object.__setattr__(self, "_work", np.zeros(interpreted(kernels.work_size)(tables)))
-        object.__setattr__(self, "_path", np.zeros((3, 3)))
+        stepping = kernels.Stepping(tables, self._work, np.zeros((3, 3)))
+        object.__setattr__(self, "_stepping", packed(stepping))
 
     @property
     def flags(self) -> int:
@@ -112,10 +116,14 @@ class LpvAircraft:
         Returns:
             A new array: the state at the end (nx,). ``flags`` tells whether the grid was left.
         """
-        end = x.copy()
-        kernels.lpv_step_steady(
-            self.tables, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt, self._work, self._path
-        )
+        # The held entry point looks at no types: these are the ones it was compiled for.
+        end, u = np.array(x, dtype=np.float64, order="C"), np.ascontiguousarray(u, dtype=np.float64)
+        step = self._step
+        if step is None:
+            arguments = (self._stepping, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt)
+            step = entry_point(kernels.lpv_step_steady, *arguments)
+            object.__setattr__(self, "_step", step)
+        step(self._stepping, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt)
         return end
 
     def trim(self, *, airspeed: float, nacelle: float, acceleration: float = 0.0) -> TrimPoint:
