@@ -25,6 +25,7 @@ from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
+from rtsim.loop import beside
 from rtsim.loop import frame_kernels as frames_of
 from rtsim.loop.data import (
     CHANNEL,
@@ -180,9 +181,10 @@ def build_parts(setup: FlightSetup) -> Parts:
         InputError: The start has no trim.
     """
     options = setup.options
+    nonlinear = options.plant == "nonlinear"
+    beside.start("nonlinear" if nonlinear else "lpv")
     loaded = load_database(options.database or None)
     database = flown_database(loaded, options.database or None)
-    nonlinear = options.plant == "nonlinear"
     own = Xv15.load().tables
     airspeed, nacelle, altitude = _start(setup)
     x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from rtsim.aircraft.points import TrimPoint
 from rtsim.errors import InputError, TrimError
+from rtsim.kernels.compiled import interpreted
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 
+_DERIVATIVE, _OUTPUTS = interpreted(kernels.lpv_derivative), interpreted(kernels.lpv_outputs)
 TRIM_TOLERANCE = 1e-9
 """Largest state derivative left by a trim of the LPV aircraft."""
 
@@ -46,7 +49,7 @@ class LpvAircraft:
         """Pack the database for the kernels."""
         tables = prepare_tables(self.database, self.form, refresh=self.refresh)
         object.__setattr__(self, "tables", tables)
-        object.__setattr__(self, "_work", np.zeros(kernels.work_size(tables)))
+        object.__setattr__(self, "_work", np.zeros(interpreted(kernels.work_size)(tables)))
         object.__setattr__(self, "_path", np.zeros((3, 3)))
 
     @property
@@ -133,7 +136,10 @@ class LpvAircraft:
         x, u, free = self._interpolated_trim(airspeed, nacelle, acceleration)
         unknown = np.concatenate([np.flatnonzero(np.arange(x.size) != self._altitude()), x.size + free])
         z = np.concatenate([x, u])
-        residual = self._trim_residual(z, airspeed, nacelle, acceleration)
+        # Where the database holds the trim itself nothing is solved, and nothing is compiled for it.
+        residual = self._trim_residual(_DERIVATIVE, z, airspeed, nacelle, acceleration)
+        solved = np.max(np.abs(residual)) < TRIM_TOLERANCE
+        derivative, outputs = (_DERIVATIVE, _OUTPUTS) if solved else (kernels.lpv_derivative, kernels.lpv_outputs)
         for _ in range(20):
             if np.max(np.abs(residual)) < TRIM_TOLERANCE:
                 break
@@ -142,14 +148,19 @@ class LpvAircraft:
                 step = 1e-6 * max(1.0, abs(z[k]))
                 shifted = z.copy()
                 shifted[k] += step
-                jacobian[:, column] = (self._trim_residual(shifted, airspeed, nacelle, acceleration) - residual) / step
+                jacobian[:, column] = (
+                    self._trim_residual(derivative, shifted, airspeed, nacelle, acceleration) - residual
+                ) / step
             z[unknown] -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-            residual = self._trim_residual(z, airspeed, nacelle, acceleration)
+            residual = self._trim_residual(derivative, z, airspeed, nacelle, acceleration)
         x, u = z[: x.size].copy(), z[x.size :].copy()
-        xdot = self.derivative(x, u, nacelle)
+        xdot, y = np.empty(x.size), np.empty(len(self.database.outputs))
+        self._work[kernels.W_FLAGS] = 0.0
+        derivative(self.tables, x, u, nacelle, xdot, self._work)
         inside = self.flags == 0
+        outputs(self.tables, x, u, nacelle, y, self._work)
         worst = float(np.max(np.abs(residual)))
-        return TrimPoint(x, u, self.outputs(x, u, nacelle), xdot, bool(inside and worst < 1e-6), worst)
+        return TrimPoint(x, u, y, xdot, bool(inside and worst < 1e-6), worst)
 
     def linearize(self, *, airspeed: float, nacelle: float) -> control.StateSpace:
         """Linear model of level flight, interpolated between the grid points.
@@ -247,13 +258,17 @@ class LpvAircraft:
             parts.append((1.0 - share) * near + share * far)
         return parts[0], parts[1], free
 
-    def _trim_residual(self, z: FloatArray, airspeed: float, nacelle: float, acceleration: float) -> FloatArray:
+    def _trim_residual(
+        self, derivative: Callable[..., None], z: FloatArray, airspeed: float, nacelle: float, acceleration: float
+    ) -> FloatArray:
         """State derivative minus the wanted one, and the airspeed that is missing."""
         d = self.database
         nx = len(d.states)
         x, u = z[:nx], z[nx:]
         iu, iw, ip = (required_position(d.states, name, "trim") for name in ("u", "w", "pitch"))
-        rest = self.derivative(x, u, nacelle)
+        rest = np.empty(nx)
+        self._work[kernels.W_FLAGS] = 0.0
+        derivative(self.tables, x, u, nacelle, rest, self._work)
         rest[iu] -= acceleration * np.cos(x[ip])
         rest[iw] -= acceleration * np.sin(x[ip])
         return np.append(rest, x[iu] * np.cos(x[ip]) + x[iw] * np.sin(x[ip]) - airspeed)
