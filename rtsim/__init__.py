@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rtsim.command import Command, Margins, Reference, Sensors
     from rtsim.corridor import Corridor, load_corridor
     from rtsim.errors import InputError, RtsimError
+    from rtsim.loop.options import FlightOptions
     from rtsim.loop.simulation import FlightSetup, Simulation
     from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
     from rtsim.pilot import MocmError, design_mocm
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 _HOME = {
     "Command": "rtsim.command",
     "Corridor": "rtsim.corridor",
+    "FlightOptions": "rtsim.loop.options",
     "FlightSetup": "rtsim.loop.simulation",
     "InputError": "rtsim.errors",
     "LpvAircraft": "rtsim.lpv.aircraft",
@@ -41,6 +43,7 @@ _HOME = {
 __all__ = [
     "Command",
     "Corridor",
+    "FlightOptions",
     "FlightSetup",
     "InputError",
     "LpvAircraft",

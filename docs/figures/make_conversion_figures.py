@@ -79,8 +79,10 @@ def fly(
     """Fly paths, each with every seed; the pilot is free of noise, so that effort shows what the air asks for."""
     programmes: list[Programme] = [path.programme() for path in paths.values()]
     air = AirSpecification() if turbulence is None else AirSpecification(turbulence=Turbulence.of_severity(turbulence))
-    setup = FlightSetup(programme=programmes[0], air=air, pilot_noise=noise, automatic_nacelle=automatic)
-    flown = BatchFlyer(setup).fly([BatchFlight(programme, seed) for programme in programmes for seed in seeds])
+    setup = FlightSetup(programme=programmes[0], air=air, automatic_nacelle=automatic)
+    flown = BatchFlyer(setup.with_options(pilot_noise=noise)).fly(
+        [BatchFlight(programme, seed) for programme in programmes for seed in seeds]
+    )
     count = len(seeds)
     return {name: flown[k * count : (k + 1) * count] for k, name in enumerate(paths)}
 
@@ -344,7 +346,7 @@ def automatic_figure() -> None:
         (AutomaticNacelle(rate=deg(7.5)), BLUE, "automatic, up to 7.5 deg/s"),
     ):
         setup = FlightSetup(programme=programme, automatic_nacelle=law)
-        rows = Simulation(setup).run(round(programme.duration * setup.rate_hz))
+        rows = Simulation(setup).run(round(programme.duration * setup.options.rate_hz))
         flight = Flight("", programme, rows, "")
         left.plot(flight["airspeed_kt"][::10], flight["nacelle_deg"][::10], color=colour, label=label)
         right.plot(flight.time[::10], flight["flapping_deg"][::10], color=colour, label=label)

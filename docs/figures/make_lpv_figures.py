@@ -72,7 +72,7 @@ def neighbour_map(database):
 
 def fly(programme, plant):
     """History of a flight on one plant."""
-    return Simulation(FlightSetup(programme=programme, plant=plant)).run(round(programme.duration * 250))
+    return Simulation(FlightSetup(programme=programme).with_options(plant=plant)).run(round(programme.duration * 250))
 
 
 def against_nonlinear():

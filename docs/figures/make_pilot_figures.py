@@ -11,11 +11,11 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
 from rtsim.analysis.frozen_loop import Condition, StabilityMap, frozen_loop, stability_map
+from rtsim.choices import OuterLoop
 from rtsim.corridor import load_corridor
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.tables import prepare_tables
-from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.tables import load_pilot_tables
 from rtsim.units import deg, kt, to_deg, to_kt
 

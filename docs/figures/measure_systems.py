@@ -9,9 +9,9 @@ import sys
 
 import numpy as np
 
+from rtsim.choices import PlantName
 from rtsim.command import Command
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.loop.setup import Plant
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
 from rtsim.units import deg, kt
@@ -20,18 +20,18 @@ FLAPS = ((0, 90, 0), (0, 90, 75), (60, 75, 20), (60, 75, 75), (105, 50, 20), (13
          (160, 0, 0))  # fmt: skip
 LEVERS = ((0, 90), (60, 75), (105, 50), (150, 0))
 COMPARED = ("airspeed_kt", "altitude_m", "pitch_deg", "flapping_deg")
-PLANTS: tuple[Plant, Plant] = ("lpv", "nonlinear")
+PLANTS: tuple[PlantName, PlantName] = ("lpv", "nonlinear")
 LEVER_STEP = 0.03
 
 
-def _simulation(airspeed: float, nacelle: float, plant: Plant) -> Simulation:
+def _simulation(airspeed: float, nacelle: float, plant: PlantName) -> Simulation:
     programme = Programme.hold(airspeed=kt(airspeed), nacelle_angle=deg(nacelle), altitude=100.0)
-    simulation = Simulation(FlightSetup(programme=programme, plant=plant))
+    simulation = Simulation(FlightSetup(programme=programme).with_options(plant=plant))
     simulation.run(250)
     return simulation
 
 
-def flaps_moved(airspeed: float, nacelle: float, setting: float, plant: Plant) -> FloatArray:
+def flaps_moved(airspeed: float, nacelle: float, setting: float, plant: PlantName) -> FloatArray:
     """Fly 40 s with the MOCM while the flaps go to a setting.
 
     Args:
@@ -45,7 +45,7 @@ def flaps_moved(airspeed: float, nacelle: float, setting: float, plant: Plant) -
     return simulation.run(40 * 250)
 
 
-def lever_moved(airspeed: float, nacelle: float, plant: Plant) -> FloatArray:
+def lever_moved(airspeed: float, nacelle: float, plant: PlantName) -> FloatArray:
     """Hold the stick, raise the lever by ``LEVER_STEP`` for 3 s with the governor off, then switch it on for 4 s.
 
     Args:
@@ -65,7 +65,7 @@ def lever_moved(airspeed: float, nacelle: float, plant: Plant) -> FloatArray:
     return np.array(rows)
 
 
-def _figure(flights: dict[tuple[int, int], dict[Plant, FloatArray]], file: str) -> None:
+def _figure(flights: dict[tuple[int, int], dict[PlantName, FloatArray]], file: str) -> None:
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(2, len(flights), figsize=(11.0, 4.6), sharex=True, layout="constrained")

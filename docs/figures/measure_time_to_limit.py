@@ -12,6 +12,8 @@ import sys
 from collections.abc import Iterator
 from importlib import resources
 
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from rtsim.protection import MarginMonitor
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.monitor import MarginHistory
@@ -26,10 +28,12 @@ def histories(campaign: str, plant: str, runs: int) -> Iterator[MarginHistory]:
     spec, problems = parse_campaign(file.read_text(encoding="utf-8"), file=str(file))
     if spec is None:
         raise problems[0]
-    bench, monitor = Bench(plant=plant, corridor=spec.corridor), MarginMonitor(spec.corridor)
+    bench, monitor = Bench(), MarginMonitor(spec.corridor)
+    options = FlightOptions(**given(spec)).changed({"plant": plant})
     for number in range(len(spec.classes)):
         for run in range(runs):
-            yield monitor.history(bench.fly(draw_plan(spec, seed=0, class_number=number, run=run), "off").rows)
+            plan = draw_plan(spec, seed=0, class_number=number, run=run, options=options)
+            yield monitor.history(bench.fly(plan, "off").rows)
 
 
 def main() -> None:

@@ -1,5 +1,5 @@
 """Pilot aids between the hands and the control mixing: damping, attitude retention, holds, trim bias."""
 
-from rtsim.aids.design import AIDS, SWITCHES, AidName, SwitchName, design_aids, switch_of, switches_of
+from rtsim.aids.design import AIDS, SWITCHES, design_aids, switch_of, switches_of
 
-__all__ = ["AIDS", "SWITCHES", "AidName", "SwitchName", "design_aids", "switch_of", "switches_of"]
+__all__ = ["AIDS", "SWITCHES", "design_aids", "switch_of", "switches_of"]

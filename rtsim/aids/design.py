@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -27,16 +27,13 @@ from rtsim.aids.aids_kernels import (
     AidTables,
 )
 from rtsim.aircraft.variables import FLAP_INPUTS
+from rtsim.choices import AidName, SwitchName
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.units import deg
 
-AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
-"""What acts between the pilot's hands and the control mixing."""
-SwitchName = Literal[AidName, "automatic_flaps", "governor"]
-"""All that can be switched in flight: the aids, and what moves flaps and rotors whoever flies."""
 SWITCHES: dict[SwitchName, int] = {
     "rate_damping": RATE_DAMPING,
     "attitude_retention": ATTITUDE_RETENTION,

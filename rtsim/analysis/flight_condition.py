@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from rtsim.aircraft import Condition, TrimPoint, Variable
+    from rtsim.choices import OuterLoop
     from rtsim.lpv import LpvAircraft
-    from rtsim.pilot.schedule import OuterLoop
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def checked_outer_loop(outer_loop: str) -> OuterLoop:
     Raises:
         InputError: Naming the option and the choices.
     """
-    from rtsim.pilot.schedule import OUTER_LOOPS
+    from rtsim.choices import OUTER_LOOPS
 
     for name in OUTER_LOOPS:
         if name == outer_loop:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.choices import OuterLoop
 from rtsim.lpv.database import Database
 from rtsim.lpv.lpv_kernels import LpvTables, lpv_step, work_size
 from rtsim.lpv.tables import Form, prepare_tables
@@ -22,7 +23,6 @@ from rtsim.pilot.design_plant import CONTROLS
 from rtsim.pilot.pilot_kernels import PilotTables
 from rtsim.pilot.problem import FloatArray
 from rtsim.pilot.response import ComplexArray, Margins, margins, one_at_a_time
-from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.tables import load_pilot_tables
 
 _STEP = 1e-5

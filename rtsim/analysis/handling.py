@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aids.aids_kernels import AID_COUNT, AID_STATE_SIZE, LAST_SWITCHES, aids_engage, aids_step
-from rtsim.aids.design import AidName, design_aids, switches_of
+from rtsim.aids.design import design_aids, switches_of
+from rtsim.choices import AidName
 from rtsim.frame import FloatArray
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.lpv_kernels import lpv_step, work_size

@@ -64,21 +64,6 @@ def trim_command(
     From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m and
     --acceleration-kt-s, solved by the nonlinear model at exactly that condition. At the edge of what the database
     covers, where one of the grid points around has no trim, the nonlinear model is asked too.
-
-    Args:
-        airspeed_kt: Horizontal airspeed [kn].
-        nacelle_deg: Nacelle angle [deg].
-        nonlinear: Solve the nonlinear model.
-        flap_deg: Flap deflection [deg].
-        rotor_rpm: Rotor speed [rpm].
-        weight_lb: Weight [lb].
-        altitude_m: Pressure altitude [m].
-        acceleration_kt_s: Level acceleration [kn/s].
-        database: Another LPV database.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        TrimError: There is no trim; the JSON object is printed all the same, with ``converged`` false and null values.
     """
     request = checked(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
@@ -116,24 +101,6 @@ def linearize_command(
     From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m and
     --acceleration-kt-s, from the nonlinear model trimmed at exactly that condition. With --closed-loop, aircraft, pilot
     and outer loops as flown: A is the map over one 4 ms frame, and the eigenvalues are log(z)/dt.
-
-    Args:
-        airspeed_kt: Horizontal airspeed [kn].
-        nacelle_deg: Nacelle angle [deg].
-        nonlinear: Linearize the nonlinear model.
-        flap_deg: Flap deflection [deg].
-        rotor_rpm: Rotor speed [rpm].
-        weight_lb: Weight [lb].
-        altitude_m: Pressure altitude [m].
-        acceleration_kt_s: Level acceleration [kn/s].
-        database: Another LPV database.
-        closed_loop: Add pilot and outer loops as flown.
-        outer_loop: How the pilot holds airspeed and altitude: integrators or pi.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        TrimError: There is no trim to linearize at.
-        InputError: An option is out of range, or the closed loop is asked for where no pilot was designed.
     """
     request = checked(
         Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,

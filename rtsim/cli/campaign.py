@@ -8,10 +8,11 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results, whole_file
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
 
@@ -29,59 +30,43 @@ def register(app: typer.Typer) -> None:
     app.command("campaign")(run_campaign_command)
 
 
+@takes_options("plant", "database", "rate_hz", own="the file's")
 def run_campaign_command(
     spec: Annotated[str, typer.Argument(help="Campaign that comes with rtsim (misuse, nominal) or a .toml file.")],
     *,
-    runs: Annotated[int | None, typer.Option(help="Runs of every class instead of the file's.", min=1)] = None,
-    jobs: Annotated[int | None, typer.Option(help="Processes; default one per core.", min=1, max=256)] = None,
+    runs: Annotated[int | None, typer.Option(help="Runs of every class.", min=1, show_default="the file's")] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes.", min=1, max=256, show_default="one per core")] = None,
     seed: Annotated[int, typer.Option(help="Seed of every draw.", min=0)] = 0,
     protection: Annotated[
-        str | None, typer.Option(help="Law under test instead of the file's: a name or MODULE:CLASS.")
+        str | None, typer.Option(help="Law under test: a name or MODULE:CLASS.", show_default="the file's")
     ] = None,
     against: Annotated[
-        list[str] | None, typer.Option(help="Law to compare it with on the same flights; repeat for several.")
+        list[str] | None,
+        typer.Option(help="Law to compare it with on the same flights; repeat for several.", show_default="the file's"),
     ] = None,
     sweep_buffer_kt: Annotated[
-        list[float] | None, typer.Option(help="Fly the law with this much added to its margins [kn] too; repeat.")
+        list[float] | None,
+        typer.Option(help="Fly the law with this much added to its margins [kn] too; repeat.", show_default="none"),
     ] = None,
-    plant: Annotated[
-        Literal["lpv", "lpv-plain", "nonlinear"] | None, typer.Option(help="Model to fly instead of the file's.")
-    ] = None,
-    rate: Annotated[int | None, typer.Option(help="Frames per second instead of the file's.", min=50, max=1000)] = None,
+    options: dict[str, Any],
     no_early_stop: Annotated[
         bool, typer.Option("--no-early-stop", help="Fly everything, though the verdict may be certain before.")
     ] = False,
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to fly on.")] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler to fly on.", show_default="this machine")
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder that keeps finished flights, so that the same command goes on there.")
+        Path | None,
+        typer.Option(
+            help="Folder for finished flights (the same command goes on there), report.json and flights.csv.",
+            show_default="none",
+        ),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Throw away what --out holds.")] = False,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.")] = None,
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.", show_default="none")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly a campaign: drawn flights, each with every law and without; exit 1 where an expectation does not hold.
-
-    Args:
-        spec: Campaign that comes with rtsim, or a file.
-        runs: Runs of every class instead of the file's.
-        jobs: Processes on this machine; the result does not depend on it.
-        seed: Seed of every draw.
-        protection: Law under test instead of the file's.
-        against: Laws to compare it with on the same flights.
-        sweep_buffer_kt: Buffers to sweep [kn].
-        plant: Aircraft model instead of the file's.
-        rate: Frames per second instead of the file's.
-        no_early_stop: Fly everything.
-        dask: Address of a Dask scheduler.
-        out: Folder that keeps finished flights and receives ``report.json`` and ``flights.csv``.
-        fresh: Throw away what the folder holds.
-        junit: Write JUnit XML here.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: The campaign, a law or an option is wrong, or the folder holds another campaign.
-        OutputError: A file cannot be written, or the cluster failed.
-    """
+    """Fly a campaign: drawn flights, each with every law and without; exit 1 where an expectation does not hold."""
     from scenarios.campaign.chunks import plan_chunks
     from scenarios.campaign.run import CampaignOptions, run_campaign
     from scenarios.campaign.spec import load_campaign
@@ -91,21 +76,20 @@ def run_campaign_command(
     if junit is not None and not junit.absolute().parent.is_dir():
         raise OutputError(f"{junit}: cannot be written: its folder does not exist.")
     campaign, text = load_campaign(spec)
-    options = CampaignOptions(
+    asked = CampaignOptions(
         law=protection,
         against=None if against is None else tuple(against),
         buffers_kt=tuple(sweep_buffer_kt or ()),
         runs=runs,
         seed=seed,
-        plant=plant,
-        rate_hz=rate,
+        changes=options,
         early_stop=not no_early_stop,
         folder=out,
         fresh=fresh,
     )
     planned = sum(chunk.count for chunk in plan_chunks(campaign, runs))
     with _executor(dask, jobs) as executor, _watched(planned, resumable=out is not None) as watch:
-        result = run_campaign(campaign, text, options=options, executor=executor, file=str(spec), on_progress=watch)
+        result = run_campaign(campaign, text, options=asked, executor=executor, file=str(spec), on_progress=watch)
     report = result.report()
     if out is not None:
         _save(result, report, out)
@@ -201,7 +185,7 @@ def _write_junit(result: CampaignResult, path: Path) -> None:
                 "event": item.event,
                 "law": item.law,
                 "seed": result.task.seed,
-                "plant": result.task.plant,
+                "plant": result.task.options.plant,
                 "count": item.rate.count,
                 "flights": item.rate.total,
                 "rate": item.rate.value,

@@ -32,12 +32,7 @@ def check_command(
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Validate scenario and campaign files, stick maps, databases; every mistake is one sentence, exit 2 for any.
-
-    Args:
-        files: What to check.
-        json: Print one JSON object on stdout.
-    """
+    """Validate scenario and campaign files, stick maps, databases; every mistake is one sentence, exit 2 for any."""
     findings = {name: file_problems(name) for name in files}
     for name, problems in findings.items():
         for problem in problems:

@@ -41,19 +41,7 @@ def corridor_command(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
 ) -> None:
-    """Show the boundaries and centre line of the conversion corridor; with a point, its margins.
-
-    Args:
-        corridor: Name of the corridor.
-        airspeed_kt: Airspeed of a point [kn].
-        nacelle_deg: Nacelle angle of the point [deg].
-        consistency: Compare the corridor with the trims of the shipped aircraft.
-        json: Print one JSON object on stdout.
-        plot: File to draw into.
-
-    Raises:
-        InputError: A value is outside its range, or only half of a point is given.
-    """
+    """Show the boundaries and centre line of the conversion corridor; with a point, its margins."""
     from rtsim.corridor import load_corridor
     from rtsim.units import deg, kt
 

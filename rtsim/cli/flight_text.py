@@ -179,11 +179,11 @@ def describe(scenario: Scenario, *, speed: float, outputs: list[str]) -> None:
     pace = (
         "as fast as possible" if math.isinf(speed) else "in real time" if speed == 1.0 else f"at {speed:g} x real time"
     )
+    options = scenario.options
     say(f"{scenario.title}: {scenario.duration:.1f} s {pace}", style="bold")
     say(
-        f"plant {scenario.plant}, pilot {scenario.pilot}, outer loop {scenario.outer_loop}, "
-        f"corridor {scenario.corridor_name}, protection {scenario.protection}, {scenario.rate_hz} Hz, "
-        f"seed {scenario.seed}",
+        f"plant {options.plant}, pilot {options.pilot}, outer loop {options.outer_loop}, "
+        f"corridor {options.corridor_name}, protection {options.protection}, {options.rate_hz} Hz, seed {options.seed}",
     )
     for line in outputs:
         say(line)

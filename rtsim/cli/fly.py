@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from rtsim.choices import HAND_PILOT
 from rtsim.cli.flight_text import FlightScreen, describe, say, summarize
+from rtsim.cli.options import takes_options
 from rtsim.cli.output import emit_json
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
 
@@ -27,6 +29,11 @@ EXIT_BY_SIGNAL = {signal.SIGINT: 130, signal.SIGTERM: 143}
 """Exit codes after a clean end that a signal asked for."""
 
 
+Layout = Literal["pilot", "engineer"]
+StartName = Literal["hover", "conversion", "cruise"]
+Severity = Literal["none", "light", "moderate", "severe"]
+
+
 def register(app: typer.Typer) -> None:
     """Add the command to the app.
 
@@ -36,6 +43,7 @@ def register(app: typer.Typer) -> None:
     app.command("fly")(fly_command)
 
 
+@takes_options()
 def fly_command(
     scenario: Annotated[
         str | None,
@@ -45,168 +53,157 @@ def fly_command(
         ),
     ] = None,
     *,
-    pilot: Annotated[
-        str | None,
-        typer.Option(
-            help="Who flies: mocm (the virtual pilot), mavlink (you), an installed pilot, or MODULE:CLASS.",
-            show_default="the scenario's, mocm",
-        ),
-    ] = None,
-    plant: Annotated[
-        Literal["lpv", "lpv-plain", "nonlinear"] | None,
-        typer.Option(
-            help="Aircraft: the layered LPV model, the paper's plain one, or the nonlinear one.",
-            show_default="the scenario's, lpv",
-        ),
-    ] = None,
-    outer_loop: Annotated[
-        Literal["integrators", "pi"] | None,
-        typer.Option(
-            help="How the MOCM holds airspeed and altitude: integrators in its design, or the paper's PI loops.",
-            show_default="the scenario's, integrators",
-        ),
-    ] = None,
-    protection: Annotated[
-        str | None,
-        typer.Option(
-            help="off; monitor: warn; governor: limit the nacelles; full: stick and lever too; MODULE:CLASS; or A,B.",
-            show_default="the scenario's, monitor",
-        ),
-    ] = None,
-    nacelle: Annotated[
-        str | None,
-        typer.Option(
-            help="Who sets the nacelle rate: programme, automatic (by airspeed) or MODULE:CLASS.",
-            show_default="the scenario's, programme",
-        ),
-    ] = None,
-    corridor: Annotated[
-        Literal["design", "flight", "model"] | None,
-        typer.Option(
-            help="Boundaries to watch: TM X-62407's chart, the stall line flown (TM 81244), or the model's own trims.",
-            show_default="the scenario's; design, or flight with a protection that acts",
-        ),
-    ] = None,
-    database: Annotated[
-        Path | None,
-        typer.Option(help="LPV database of your own (.nc, .mat).", show_default="the scenario's, the shipped XV-15"),
-    ] = None,
-    speed: Annotated[str, typer.Option(help="Multiple of real time, or max: headless, as fast as it goes.")] = "1",
-    rate: Annotated[int | None, typer.Option(help="Frames per second [Hz].", show_default="250")] = None,
-    seed: Annotated[int | None, typer.Option(help="Root of every random stream.", show_default="0")] = None,
-    duration: Annotated[
-        float | None, typer.Option(help="End after so many seconds [s].", show_default="the scenario's")
-    ] = None,
+    options: dict[str, Any],
     start: Annotated[
-        Literal["hover", "conversion", "cruise"] | None,
+        StartName | None,
         typer.Option(
             help="Where to start: 0 kn at 90 deg, 80 kn at 75 deg, or 170 kn at 0 deg.",
             show_default="the programme's first point",
+            rich_help_panel="Start",
         ),
     ] = None,
-    airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed at the start [kn].")] = None,
-    nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle at the start [deg], 90 helicopter.")] = None,
-    altitude_m: Annotated[float | None, typer.Option(help="Altitude at the start [m].")] = None,
-    wind_kt: Annotated[float | None, typer.Option(help="Steady tailwind [kn]; negative is a headwind.")] = None,
-    turbulence: Annotated[
-        Literal["none", "light", "moderate", "severe"] | None, typer.Option(help="Dryden turbulence (MIL-F-8785C).")
+    airspeed_kt: Annotated[
+        float | None,
+        typer.Option(help="Airspeed at the start [kn].", show_default="the programme's", rich_help_panel="Start"),
     ] = None,
-    pilot_noise: Annotated[bool | None, typer.Option(help="Let the MOCM's observation and motor noise act.")] = None,
-    headless: Annotated[bool, typer.Option("--headless", help="Open no viewer.")] = False,
-    record: Annotated[Path | None, typer.Option(help="Write the Rerun view into FILE.rrd.")] = None,
+    nacelle_deg: Annotated[
+        float | None,
+        typer.Option(
+            help="Nacelle angle at the start [deg], 90 helicopter.",
+            show_default="the programme's",
+            rich_help_panel="Start",
+        ),
+    ] = None,
+    altitude_m: Annotated[
+        float | None,
+        typer.Option(help="Altitude at the start [m].", show_default="the programme's, 100", rich_help_panel="Start"),
+    ] = None,
+    turbulence: Annotated[
+        Severity | None,
+        typer.Option(
+            help="Dryden turbulence (MIL-F-8785C).", show_default="the scenario's, none", rich_help_panel="Air"
+        ),
+    ] = None,
+    speed: Annotated[
+        str, typer.Option(help="Multiple of real time, or max: headless, as fast as it goes.", rich_help_panel="Loop")
+    ] = "1",
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            help="End after so many seconds [s].",
+            show_default="the scenario's; 60 where a start is held",
+            rich_help_panel="Loop",
+        ),
+    ] = None,
+    overrun_policy: Annotated[
+        str, typer.Option(help="catch-up, or stop:N to end at the Nth overrun.", rich_help_panel="Loop")
+    ] = "catch-up",
+    headless: Annotated[
+        bool,
+        typer.Option(
+            "--headless",
+            help="Open no viewer.",
+            show_default="a viewer, where there is a display",
+            rich_help_panel="Outputs",
+        ),
+    ] = False,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Write the Rerun view into FILE.rrd.", show_default="none", rich_help_panel="Outputs"),
+    ] = None,
     layout: Annotated[
-        Literal["pilot", "engineer"],
-        typer.Option(help="Layout of the viewer: instruments large, or plots of every signal."),
+        Layout,
+        typer.Option(
+            help="Layout of the viewer: instruments large, or plots of every signal.", rich_help_panel="Outputs"
+        ),
     ] = "pilot",
-    log: Annotated[Path | None, typer.Option(help="Write the flight log PATH.parquet (a directory).")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an earlier log at that path.")] = False,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the flight log PATH.parquet (a directory).", show_default="none", rich_help_panel="Outputs"
+        ),
+    ] = None,
+    overwrite: Annotated[
+        bool,
+        typer.Option(
+            "--overwrite",
+            help="Replace an earlier log at that path.",
+            show_default="it is refused",
+            rich_help_panel="Outputs",
+        ),
+    ] = False,
+    json: Annotated[
+        bool,
+        typer.Option(
+            "--json",
+            help="Print one JSON object on stdout.",
+            show_default="a summary for people",
+            rich_help_panel="Outputs",
+        ),
+    ] = False,
     mavlink: Annotated[
         list[str] | None,
         typer.Option(
-            help="Send MAVLink to HOST:PORT, repeatable.", show_default="none; 127.0.0.1:14550 with --pilot mavlink"
+            help="Send MAVLink to HOST:PORT, repeatable.",
+            show_default="none; 127.0.0.1:14550 with --pilot mavlink",
+            rich_help_panel="MAVLink",
         ),
     ] = None,
     mavlink_bind: Annotated[
-        str | None, typer.Option(help="Receive MAVLink on HOST:PORT.", show_default="a free port")
+        str | None,
+        typer.Option(
+            help="Receive MAVLink on HOST:PORT.", show_default="a free port of this machine", rich_help_panel="MAVLink"
+        ),
     ] = None,
     mavlink_network: Annotated[
-        bool, typer.Option("--mavlink-network", help="Let MAVLink leave this machine. It has no authentication.")
+        bool,
+        typer.Option(
+            "--mavlink-network",
+            help="Let MAVLink leave this machine. It has no authentication.",
+            show_default="it stays here",
+            rich_help_panel="MAVLink",
+        ),
     ] = False,
-    mavlink_key: Annotated[Path | None, typer.Option(help="Sign MAVLink with the key in FILE.")] = None,
-    mavlink_parameters: Annotated[Path | None, typer.Option(help="Where MAVLink parameters are stored.")] = None,
-    stick_map: Annotated[str | None, typer.Option(help="Vehicle stick map: a name or a .toml file.")] = None,
+    mavlink_key: Annotated[
+        Path | None,
+        typer.Option(help="Sign MAVLink with the key in FILE.", show_default="unsigned", rich_help_panel="MAVLink"),
+    ] = None,
+    mavlink_parameters: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where MAVLink parameters are stored.",
+            show_default="~/.config/rtsim/mavlink_parameters.toml",
+            rich_help_panel="MAVLink",
+        ),
+    ] = None,
+    stick_map: Annotated[
+        str | None,
+        typer.Option(
+            help="Vehicle stick map: a name or a .toml file.",
+            show_default="the standard map",
+            rich_help_panel="MAVLink",
+        ),
+    ] = None,
     autopilot: Annotated[
-        Literal["px4", "generic"], typer.Option(help="How ground stations read the flight modes.")
+        Literal["px4", "generic"],
+        typer.Option(help="How ground stations read the flight modes.", rich_help_panel="MAVLink"),
     ] = "px4",
-    overrun_policy: Annotated[str, typer.Option(help="catch-up, or stop:N to end at the Nth overrun.")] = "catch-up",
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Fly a scenario: the XV-15, the MOCM pilot, the conversion corridor, in real time unless --speed says otherwise.
 
     While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, o
     overrides the protection, t and h switch rate damping and attitude retention, u and g automatic flaps and the
     rotor-speed governor, v and b move the flaps down and up, q quits.
-
-    Args:
-        scenario: Name or path.
-        pilot: Who flies.
-        plant: Model to fly.
-        outer_loop: How the MOCM holds airspeed and altitude.
-        protection: Protection laws in the order in which they act.
-        nacelle: Who sets the nacelle rate.
-        corridor: Boundaries to watch.
-        database: LPV database to fly.
-        speed: Multiple of real time, or max.
-        rate: Frames per second [Hz].
-        seed: Root of every random stream.
-        duration: Length of the flight [s].
-        start: Named start.
-        airspeed_kt: Airspeed at the start [kn].
-        nacelle_deg: Nacelle angle at the start [deg].
-        altitude_m: Altitude at the start [m].
-        wind_kt: Steady tailwind [kn].
-        turbulence: Severity of the turbulence.
-        pilot_noise: Whether the MOCM's noise acts.
-        headless: Open no viewer.
-        record: Rerun recording to write.
-        layout: Layout of the viewer.
-        log: Flight log to write.
-        overwrite: Replace an earlier log.
-        mavlink: Where to send MAVLink.
-        mavlink_bind: Where to receive MAVLink.
-        mavlink_network: Let MAVLink leave this machine.
-        mavlink_key: Signing key.
-        mavlink_parameters: Where MAVLink parameters are stored.
-        stick_map: Vehicle stick map.
-        autopilot: How ground stations read the flight modes.
-        overrun_policy: What to do about overruns.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: Something that was asked for does not exist or is out of range.
-        OutputError: A log or recording failed.
-        OverrunStop: The overrun policy ended the flight.
     """
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
     from scenarios.files.options import Overrides, chosen_scenario
-    from scenarios.flight.pilots import HAND_PILOT
     from scenarios.flight.preflight import preflight_problems
 
     OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
-        plant=plant,
-        outer_loop=outer_loop,
-        pilot=pilot,
-        protection=protection,
-        nacelle=nacelle,
-        corridor=corridor,
-        database=None if database is None else str(database.resolve()),
-        rate_hz=rate,
-        seed=seed,
-        wind=None if wind_kt is None else kt(wind_kt),
+        **options,
         turbulence=turbulence,
-        pilot_noise=pilot_noise,
         duration=duration,
         start=start,
         airspeed=None if airspeed_kt is None else kt(airspeed_kt),
@@ -218,7 +215,7 @@ def fly_command(
     for problem in preflight_problems(chosen):
         raise problem
     link = None
-    if mavlink or mavlink_bind or chosen.pilot == HAND_PILOT:
+    if mavlink or mavlink_bind or chosen.options.pilot == HAND_PILOT:
         from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced
 
         link = MavlinkOptions(
@@ -244,6 +241,11 @@ def fly_command(
         places = {"log": log, "record": record}
         given = {key: str(path) for key, path in places.items() if path is not None}
         emit_json({**flight.summary(), "first_frame_s": first_frame_s, **given})
+    _end(flight, code)
+
+
+def _end(flight: FlightRecord, code: int) -> None:
+    """End the command as the flight ended."""
     if code:
         if flight.failure is not None:
             say(f"Also: {flight.failure}")
@@ -298,7 +300,7 @@ def process_age_s() -> float | None:
     return uptime_s - started_ticks / os.sysconf("SC_CLK_TCK")
 
 
-def _view_options(*, headless: bool, record: Path | None, layout: Literal["pilot", "engineer"]) -> ViewOptions | None:
+def _view_options(*, headless: bool, record: Path | None, layout: Layout) -> ViewOptions | None:
     """What to show; None for nothing. Without a display the viewer is left out, which is said."""
     from telemetry.view.options import ViewOptions, display_available
 

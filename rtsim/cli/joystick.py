@@ -50,21 +50,6 @@ def joystick_command(
     """Fly a MAVLink vehicle with a gamepad or the keyboard: MANUAL_CONTROL at 50 Hz.
 
     Start the aircraft first, in another terminal: rtsim fly manual_flight --pilot mavlink
-
-    Args:
-        keyboard: Fly with the keyboard.
-        device: Which gamepad.
-        stick_map: Which map.
-        listen: Where to wait for a vehicle.
-        connect: Where to call one.
-        rate: Messages per second [Hz].
-        wizard: Map file to make.
-        list_devices: List and end.
-        duration: Length [s].
-        json: Print one JSON object.
-
-    Raises:
-        InputError: There is no such device or map, or the port is taken.
     """
     from telemetry.joystick.sender import Sender
     from telemetry.mavlink.config import Endpoint

@@ -35,17 +35,7 @@ def plot_command(
     out: Annotated[Path | None, typer.Option(help="Directory for the pictures (LOG's name with -plots).")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Draw a recorded flight: corridor, time histories, controls, flapping, margins, timing; as SVG and PNG.
-
-    Args:
-        log: The flight log.
-        out: Directory for the pictures.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: It is no log, or holds no flight.
-        OutputError: The pictures cannot be written.
-    """
+    """Draw a recorded flight: corridor, time histories, controls, flapping, margins, timing; as SVG and PNG."""
     from telemetry.log.flight_plots import plot_flight
     from telemetry.log.reader import read_log
 
@@ -59,15 +49,7 @@ def plot_command(
 
 
 def info_command(log: LogArgument, *, json: JsonOption = False) -> None:
-    """Say what a log holds, and whether its rows still have the hash it was closed with.
-
-    Args:
-        log: The flight log.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: It is no log.
-    """
+    """Say what a log holds, and whether its rows still have the hash it was closed with."""
     from telemetry.log.reader import read_log
 
     flight = read_log(log)
@@ -84,17 +66,7 @@ def export_command(
     *,
     json: JsonOption = False,
 ) -> None:
-    """Write all signals of a log to a CSV or MAT file.
-
-    Args:
-        log: The flight log.
-        target: File to write; its ending says which kind.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: It is no log, or the ending is unknown.
-        OutputError: The file cannot be written.
-    """
+    """Write all signals of a log to a CSV or MAT file."""
     from telemetry.log.export import export_log
     from telemetry.log.reader import read_log
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import inspect
 import os
-import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -92,18 +90,7 @@ def build_app() -> typer.Typer:
                 raise
             continue
         module.register(app)
-    _help_without_arguments(app)
     return app
-
-
-def _help_without_arguments(app: typer.Typer) -> None:
-    """Show people the docstring's text only: its ``Args:`` and ``Raises:`` are for readers of the code."""
-    for command in app.registered_commands:
-        text = command.help or inspect.getdoc(command.callback) or ""
-        command.help = re.split(r"\n\s*(?:Args|Raises|Returns):\n", text)[0].strip()
-    for group in app.registered_groups:
-        if group.typer_instance is not None:
-            _help_without_arguments(group.typer_instance)
 
 
 def _fail(sentence: str) -> None:

@@ -51,17 +51,7 @@ def build_command(
     without_pilot: Annotated[bool, typer.Option("--without-pilot", help="Leave the pilot's gains out.")] = False,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
-    """Build the database from the nonlinear model: trims, linear models, and the pilot's gains at every grid point.
-
-    Args:
-        out: File to write.
-        jobs: Processes to use; the result does not depend on it.
-        without_pilot: Leave the pilot's gains out.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        OutputError: The file could not be written.
-    """
+    """Build the database from the nonlinear model: trims, linear models, and the pilot's gains at every grid point."""
     from rtsim.lpv.files.netcdf import SHIPPED
     from rtsim.lpv.files.storage import save_database
 
@@ -89,8 +79,9 @@ def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> 
 
 def _with_pilots(database: Database, jobs: int, advance: Callable[[float], None]) -> Database:
     """Design the MOCM in all its forms; each tells its progress from 0 to 1."""
+    from rtsim.choices import OUTER_LOOPS
     from rtsim.lpv.database import JACOBIAN_BITS, PilotArrays, round_mantissa
-    from rtsim.pilot.schedule import OUTER_LOOPS, design_schedule
+    from rtsim.pilot.schedule import design_schedule
 
     for outer_loop in OUTER_LOOPS:
         pilot = design_schedule(database, outer_loop=outer_loop, jobs=jobs, progress=advance)
@@ -105,15 +96,7 @@ def info_command(
     *,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
-    """Say what a database holds: grid, variables, condition, pilots, hash, and how dense its grid is.
-
-    Args:
-        file: Database file.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: The file is missing or not a usable database.
-    """
+    """Say what a database holds: grid, variables, condition, pilots, hash, and how dense its grid is."""
     from rtsim.lpv.files.netcdf import SHIPPED
     from rtsim.lpv.files.storage import load_database
 
@@ -130,15 +113,7 @@ def export_command(
     *,
     database: Annotated[Path | None, typer.Option(help="Database to export; the default is the shipped one.")] = None,
 ) -> None:
-    """Write the database for other programs: NetCDF (.nc) or MATLAB (.mat).
-
-    Args:
-        file: File to write.
-        database: Database to export.
-
-    Raises:
-        InputError: The name ends in neither .nc nor .mat, or the database is not usable.
-    """
+    """Write the database for other programs: NetCDF (.nc) or MATLAB (.mat)."""
     from rtsim.lpv.files.storage import load_database, save_database
 
     _require_suffix(file)
@@ -161,15 +136,6 @@ def import_command(
 
     Fly it with 'rtsim fly --database FILE', look at it with 'rtsim trim --database FILE', or take it into Python with
     rtsim.load_aircraft(FILE).
-
-    Args:
-        file: Database to read.
-        out: File to write.
-        design_pilots: Design the MOCM for it.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: The file is not a usable database: the message names the array and what is wrong.
     """
     from rtsim.lpv.files.storage import load_database, save_database
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, results, whole_file
 from rtsim.errors import InputError
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from rtsim.optimization.problem import ConversionProblem
     from rtsim.optimization.search import Evaluator, Progress, SearchResult
     from rtsim.optimization.spec import SearchSpec
+
+_OWN = "the specification's"
 
 
 def register(app: typer.Typer) -> None:
@@ -28,55 +31,51 @@ def register(app: typer.Typer) -> None:
     app.command("optimize")(optimize_command)
 
 
+@takes_options("database", own=_OWN)
 def optimize_command(
-    spec: Annotated[Path | None, typer.Argument(help="Specification (TOML); without one, the paper's search.")] = None,
+    spec: Annotated[
+        Path | None, typer.Argument(help="Specification (TOML).", show_default="the paper's search")
+    ] = None,
     *,
     objective: Annotated[
-        list[str] | None, typer.Option(help="What to minimize; repeat for a Pareto front (with --method nsga2).")
+        list[str] | None,
+        typer.Option(
+            help="What to minimize; repeat for a Pareto front (with --method nsga2).",
+            show_default=_OWN,
+        ),
     ] = None,
     like: Annotated[
-        str | None, typer.Option(help="Constraint set of a path of the paper: typical, near_stall, centre_line, ...")
+        str | None,
+        typer.Option(
+            help="Constraint set of a path of the paper: typical, near_stall, centre_line, ...", show_default="none"
+        ),
     ] = None,
-    generations: Annotated[int | None, typer.Option(help="Generations to search.")] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates per generation.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Root of the search's random stream.")] = None,
-    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.")] = None,
-    handling: Annotated[str | None, typer.Option(help="Constraints by feasibility or by penalty.")] = None,
-    points: Annotated[int | None, typer.Option(help="Free points of the path.")] = None,
-    nacelle_rate_deg_s: Annotated[float | None, typer.Option(help="Nacelle rate [deg/s].")] = None,
-    robust: Annotated[int | None, typer.Option(help="Flights in turbulence that judge each path; 0: calm air.")] = None,
-    jobs: Annotated[int | None, typer.Option(help="Threads that fly; default one per core.", min=1, max=256)] = None,
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler to fly on.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Scenario file to write; default NAME.toml here.")] = None,
+    generations: Annotated[int | None, typer.Option(help="Generations to search.", show_default=_OWN)] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default=_OWN)] = None,
+    seed: Annotated[int | None, typer.Option(help="Root of the search's random stream.", show_default=_OWN)] = None,
+    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.", show_default=_OWN)] = None,
+    handling: Annotated[
+        str | None, typer.Option(help="Constraints by feasibility or by penalty.", show_default=_OWN)
+    ] = None,
+    points: Annotated[int | None, typer.Option(help="Free points of the path.", show_default=_OWN)] = None,
+    nacelle_rate_deg_s: Annotated[float | None, typer.Option(help="Nacelle rate [deg/s].", show_default=_OWN)] = None,
+    robust: Annotated[
+        int | None,
+        typer.Option(help="Flights in turbulence that judge each path; 0: calm air.", show_default=_OWN),
+    ] = None,
+    options: dict[str, Any],
+    jobs: Annotated[
+        int | None, typer.Option(help="Threads that fly.", show_default="one per core", min=1, max=256)
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler to fly on.", show_default="this machine")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Scenario file to write.", show_default="NAME.toml here")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the record beside the scenario file.")] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave the nonlinear check flight out.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Search the best conversion path by flying every candidate in the closed loop.
-
-    Args:
-        spec: Specification file.
-        objective: What to minimize.
-        like: Constraint set of a path of the paper.
-        generations: Generations to search.
-        population: Candidates per generation.
-        seed: Root of the search's random stream.
-        method: Search method.
-        handling: How constraints are handled.
-        points: Free points of the path.
-        nacelle_rate_deg_s: Nacelle rate [deg/s].
-        robust: Flights in turbulence that judge each path.
-        jobs: Threads that fly; the result does not depend on it.
-        dask: Address of a Dask scheduler.
-        out: Scenario file to write.
-        resume: Go on from the record of an earlier run.
-        no_check: Leave the nonlinear check flight out.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: A value is not allowed, a package is missing, or the record belongs to another search.
-        OutputError: A file cannot be written.
-    """
+    """Search the best conversion path by flying every candidate in the closed loop."""
     changes = {
         "objectives": objective,
         "points": points,
@@ -87,6 +86,7 @@ def optimize_command(
         "search.method": method,
         "search.handling": handling,
         "robust.flights": robust,
+        "flight.database": options.get("database"),
     }
     chosen = _specification(spec, like, {key: value for key, value in changes.items() if value is not None})
     scenario_file = out if out is not None else Path(f"{chosen.name}.toml")

@@ -40,15 +40,6 @@ def design_command(
 
     Without --case every case of the file is solved, its rejects must be refused with their code, and values
     under [case.NAME.expect] are compared.
-
-    Args:
-        file: Case file.
-        case: Name of one case.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: The file is no case file, or the case asked for is refused.
-        Exit: With 1 where an expectation failed, with 2 where a case is refused.
     """
     from rtsim.pilot.cases import load_cases
 

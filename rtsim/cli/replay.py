@@ -26,15 +26,7 @@ def replay_command(
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs.
-
-    Args:
-        log: The flight log.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: It is no log, or holds no frames.
-    """
+    """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs."""
     from scenarios.flight.replay import replay_log
 
     result = replay_log(log)

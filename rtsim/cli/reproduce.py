@@ -32,15 +32,6 @@ def reproduce_command(
     """Regenerate the paper's figures from flights, judge its claims and write a report.
 
     A claim that does not hold is a result, not a fault: the exit code is 0 whenever the report is written.
-
-    Args:
-        out: Directory for the report (``report.html``), the claims (``claims.json``) and the figures; made if needed.
-        jobs: Processes that fly; the result does not depend on it.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: ``out`` is a file.
-        OutputError: A file cannot be written.
     """
     from scenarios.reproduction.run import reproduce, total_work
 

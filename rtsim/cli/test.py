@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results, whole_file
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError, RtsimError
 
 if TYPE_CHECKING:
-    from scenarios.files.scenario import PlantName, Scenario
+    from scenarios.files.scenario import Scenario
     from scenarios.verdicts.tester import Case
 
 
@@ -24,6 +25,7 @@ def register(app: typer.Typer) -> None:
     app.command("test")(run_tests)
 
 
+@takes_options("plant", "database", "rate_hz", own="each scenario's")
 def run_tests(
     paths: Annotated[
         list[str] | None,
@@ -31,34 +33,22 @@ def run_tests(
     ] = None,
     *,
     protection: Annotated[
-        str | None, typer.Option(help="Law under test instead of each scenario's own: a name or MODULE:CLASS.")
+        str | None,
+        typer.Option(help="Law under test: a name or MODULE:CLASS.", show_default="each scenario's, full in a trial"),
     ] = None,
-    plant: Annotated[
-        Literal["lpv", "lpv-plain", "nonlinear"] | None, typer.Option(help="Model to fly instead of each scenario's.")
+    options: dict[str, Any],
+    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.", show_default="none")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write a report with pictures here.", show_default="none")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for a replay bundle of every failure.", show_default="none")
     ] = None,
-    junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.")] = None,
-    html: Annotated[Path | None, typer.Option(help="Write a report with pictures here.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for a replay bundle of every failure.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails.
-
-    Args:
-        paths: Scenario names, files or folders; none tests the whole library.
-        protection: Law under test instead of each scenario's own.
-        plant: Model to fly instead of each scenario's own.
-        junit: Write JUnit XML here.
-        html: Write a report with pictures here.
-        out: Folder for a replay bundle of every failure.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: A scenario or law does not exist, or nothing is to be tested.
-    """
+    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails."""
     for file in (junit, html):
         _check_writable(file)
     scenarios = _chosen(paths or [])
-    cases = _flown(scenarios, protection, plant)
+    cases = _flown(scenarios, protection, options)
     if junit is not None:
         _write_junit(cases, junit)
     if html is not None:
@@ -110,10 +100,10 @@ def _chosen(paths: list[str]) -> list[Scenario]:
     return tests
 
 
-def _flown(scenarios: list[Scenario], protection: str | None, plant: PlantName | None) -> list[Case]:
+def _flown(scenarios: list[Scenario], protection: str | None, options: dict[str, Any]) -> list[Case]:
     from scenarios.verdicts.tester import Tester, broken_case
 
-    tester = Tester(law=protection, plant=plant)
+    tester = Tester(law=protection, **options)
     cases = []
     with progress("Testing", total=len(scenarios)) as advance:
         for scenario in scenarios:
@@ -139,9 +129,9 @@ def _write_junit(cases: list[Case], path: Path) -> None:
                 properties={
                     "law": case.law,
                     "kind": case.kind,
-                    "plant": case.scenario.plant,
-                    "corridor": case.scenario.corridor_name,
-                    "seed": case.scenario.seed,
+                    "plant": case.scenario.options.plant,
+                    "corridor": case.scenario.options.corridor_name,
+                    "seed": case.scenario.options.seed,
                     **case.metrics,
                     **{f"off.{name}": value for name, value in case.off_metrics.items()},
                 },

@@ -38,26 +38,14 @@ def timing_command(
     plot: Annotated[Path | None, typer.Option(help="Draw histograms into FILE (.png, .svg or .pdf).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly the hover in real time and report lateness, work, overruns and drift.
-
-    Args:
-        duration: How long to measure [s].
-        rate: Frames per second [Hz].
-        plot: File to draw histograms into.
-        json: Print one JSON object on stdout.
-
-    Raises:
-        InputError: An option is out of range.
-    """
-    from scenarios.files.options import RATE_RANGE
+    """Fly the hover in real time and report lateness, work, overruns and drift."""
+    from rtsim.loop.options import declared
 
     if not 0.1 <= duration <= 3600.0:
         raise InputError(
             "is out of range", key="--duration", value=duration, allowed="0.1 to 3600 s", mend="choose one"
         )
-    if not RATE_RANGE[0] <= rate <= RATE_RANGE[1]:
-        allowed = f"{RATE_RANGE[0]} to {RATE_RANGE[1]} Hz"
-        raise InputError("is out of range", key="--rate", value=rate, allowed=allowed, mend="choose one")
+    declared()["rate_hz"].check(rate)
     say(f"Flying the hover at {rate} Hz for {duration:g} s; leave the machine alone meanwhile.")
     report, log = _measure(duration, rate)
     if plot is not None:

@@ -4,13 +4,11 @@ Import ``rtsim.corridor.corridor_kernels`` for the compiled functions; this pack
 """
 
 from rtsim.corridor.boundaries import (
-    CORRIDOR_NAMES,
     LEVEL_NAMES,
     Boundary,
     Corridor,
-    CorridorName,
     Levels,
     load_corridor,
 )
 
-__all__ = ["CORRIDOR_NAMES", "LEVEL_NAMES", "Boundary", "Corridor", "CorridorName", "Levels", "load_corridor"]
+__all__ = ["LEVEL_NAMES", "Boundary", "Corridor", "Levels", "load_corridor"]

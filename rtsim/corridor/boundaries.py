@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,6 @@ from rtsim.units import deg, kt
 if TYPE_CHECKING:
     from rtsim.corridor.corridor_kernels import CorridorTables
 
-CorridorName = Literal["design", "flight"]
-CORRIDOR_NAMES: tuple[CorridorName, ...] = ("design", "flight")
 LEVEL_NAMES = ("clear", "caution", "warning", "exceedance")
 """Words for the levels 0 to 3 of ``corridor_level``."""
 

@@ -92,7 +92,7 @@ def main() -> None:
     from rtsim.protection.monitor import compile_watch
 
     programme = Programme.hold(airspeed=0.0, nacelle_angle=math.pi / 2.0, altitude=100.0)
-    setup = FlightSetup(programme=programme, protection="monitor")
+    setup = FlightSetup(programme=programme).with_options(protection="monitor")
     parts = build_parts(setup)
     state, addresses = start_state(setup, parts, np.zeros(3)), np.zeros(PART.size, dtype=np.int64)
     flight = packed(Flight(parts.tables, state, new_scratch(parts.tables), np.zeros(0), addresses))

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any
 
 import numpy as np
 
-from rtsim.aids import AidName, SwitchName, design_aids, switches_of
+from rtsim.aids import design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
 from rtsim.atmosphere.air import gust_tables, new_gust_state
+from rtsim.choices import CorridorName, PlantName, SwitchName
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
@@ -40,6 +42,7 @@ from rtsim.loop.data import (
     SimulationTables,
 )
 from rtsim.loop.flying import Flying, Measure, new_streams
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
@@ -55,8 +58,8 @@ from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
-from rtsim.programme import Programme
-from rtsim.protection.boundary import BoundaryName, load_boundary
+from rtsim.programme import Programme, ProgrammePoint
+from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
 from rtsim.protection.law_data import LAW_STATE_SIZE, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
@@ -67,8 +70,7 @@ from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
 from rtsim.units import to_deg, to_kt
 
-Plant = Literal["lpv", "lpv-plain", "nonlinear"]
-PLANT_FORMS: dict[Plant, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
+PLANT_FORMS: dict[PlantName, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
 REFERENCE_FREQUENCY = 1.5
 """Natural frequency of the airspeed reference filter [rad/s]."""
 
@@ -79,34 +81,10 @@ class FlightSetup:
 
     programme: Programme
     """Airspeed, nacelle angle and altitude over time."""
-    plant: Plant = "lpv"
-    """``lpv`` (three scheduling variables), ``lpv-plain`` (the paper's form) or ``nonlinear``."""
-    outer_loop: Literal["integrators", "pi"] = "integrators"
-    """How the MOCM holds airspeed and altitude."""
-    pilot: Literal["mocm", "external"] = "mocm"
-    """Who flies at frame 0."""
-    corridor: BoundaryName = "design"
-    """Boundaries to watch."""
-    rate_hz: int = 250
-    """Frames per second."""
-    start_airspeed: float | None = None
-    """Airspeed at frame 0 [m/s]; None: the programme's first."""
-    start_nacelle: float | None = None
-    """Nacelle angle at frame 0 [rad]; None: the programme's first."""
-    start_altitude: float | None = None
-    """Altitude at frame 0 [m]; None: the programme's first."""
-    wind: float = 0.0
-    """Steady tailwind [m/s]."""
-    seed: int = 0
-    """Root of every random stream."""
-    pilot_noise: bool = False
-    """Let the MOCM's observation and motor noise act."""
-    aids: tuple[AidName, ...] = ()
-    """Pilot aids on at frame 0; they act on hands and plug-ins, not on the MOCM and not on held controls."""
-    automatic_flaps: bool = True
-    """Whether the flaps follow their schedule at frame 0, whoever flies; else they stay where they are."""
-    governor: bool = True
-    """Whether the governor holds the rotor speed at frame 0, whoever flies."""
+    options: FlightOptions = FlightOptions(protection="off")
+    """Who flies what; by default nothing watches or protects."""
+    start: ProgrammePoint | None = None
+    """Trimmed condition at frame 0; None: the programme's first point."""
     air: AirSpecification = CALM
     """Gusts and turbulence."""
     pulses: tuple[Pulse, ...] = ()
@@ -117,13 +95,14 @@ class FlightSetup:
     """Failures and their times."""
     automatic_nacelle: AutomaticNacelle | None = None
     """Automatic nacelle control, which sets the nacelle rate whoever flies; None: the pilot does."""
-    protection: str = "off"
-    """Protection laws in the order in which they act, separated by commas: ``off``, ``monitor``, ``governor``,
-    ``full``, ``MODULE:CLASS`` or an entry point."""
-    protection_boundary: BoundaryName = "flight"
-    """Corridor that the built-in laws keep to."""
-    database: str = ""
-    """LPV database that is flown, a file (``.nc``, ``.mat``); empty: the shipped XV-15."""
+
+    def with_options(self, **changes: Any) -> FlightSetup:
+        """The setup with other options.
+
+        Args:
+            changes: Values by field of :class:`~rtsim.loop.options.FlightOptions`, SI.
+        """
+        return dataclasses.replace(self, options=self.options.changed(changes))
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,11 +126,8 @@ class Parts:
 
 
 def _start(setup: FlightSetup) -> tuple[float, float, float]:
-    first = setup.programme.at(0.0)
-    airspeed = first.airspeed if setup.start_airspeed is None else setup.start_airspeed
-    nacelle = first.nacelle_angle if setup.start_nacelle is None else setup.start_nacelle
-    altitude = first.altitude if setup.start_altitude is None else setup.start_altitude
-    return airspeed, nacelle, altitude
+    start = setup.programme.at(0.0) if setup.start is None else setup.start
+    return start.airspeed, start.nacelle_angle, start.altitude
 
 
 @functools.lru_cache(maxsize=16)
@@ -186,12 +162,12 @@ def start_trim(nonlinear: bool, database: Database, airspeed: float, nacelle: fl
 
 
 @functools.lru_cache(maxsize=8)
-def _corridor_tables(name: BoundaryName, database: Database) -> CorridorTables:
+def _corridor_tables(name: CorridorName, database: Database) -> CorridorTables:
     return packed(load_boundary(name, database).tables())
 
 
 @functools.lru_cache(maxsize=16)
-def _law(name: str, boundary: BoundaryName, database: Database, dt: float) -> ProtectionTables:
+def _law(name: str, boundary: CorridorName, database: Database, dt: float) -> ProtectionTables:
     return packed(law_tables(name, database, dt=dt, boundary=boundary))
 
 
@@ -204,28 +180,29 @@ def build_parts(setup: FlightSetup) -> Parts:
     Raises:
         InputError: The start has no trim.
     """
-    beside.start("nonlinear" if setup.plant == "nonlinear" else "lpv")
-    loaded = load_database(setup.database or None)
-    database = flown_database(loaded, setup.database or None)
-    nonlinear = setup.plant == "nonlinear"
+    options = setup.options
+    nonlinear = options.plant == "nonlinear"
+    beside.start("nonlinear" if nonlinear else "lpv")
+    loaded = load_database(options.database or None)
+    database = flown_database(loaded, options.database or None)
     own = Xv15.load().tables
     airspeed, nacelle, altitude = _start(setup)
     x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle))
     x[STATE.altitude] = altitude
     programme = setup.programme
-    dt = 1.0 / setup.rate_hz
-    pilot = load_pilot_tables(database, setup.outer_loop, dt=dt)
+    dt, corridor = 1.0 / options.rate_hz, options.corridor_name
+    pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
     tables = SimulationTables(
         dt=dt,
-        wind=float(setup.wind),
+        wind=float(options.wind),
         plant=PlantTables(
-            aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[setup.plant])),
+            aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[options.plant])),
             configuration=own.configuration,
             controls=own.controls,
         ),
         nacelle=load_nacelle_tables(),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
-        corridor=_corridor_tables(setup.corridor, database),
+        corridor=_corridor_tables(corridor, database),
         pilot=pilot,
         flaps=load_flap_tables(own),
         drive=load_drive_tables(own),
@@ -233,9 +210,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         gusts=gust_tables(setup.air),
         faults=fault_tables(setup.faults),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
-        protection=_law(
-            compiled_law(load_laws(setup.protection)) or "monitor", setup.protection_boundary, database, dt
-        ),
+        protection=_law(compiled_law(load_laws(options.protection)) or "monitor", corridor, database, dt),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
         script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
         units=UNIT_SCALES,
@@ -244,7 +219,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     return Parts(
         tables=tables,
         nonlinear=nonlinear,
-        noise_width=interpreted(noise_width)(pilot) if setup.pilot_noise else 0,
+        noise_width=interpreted(noise_width)(pilot) if options.pilot_noise else 0,
         database_hash=loaded.content_hash,
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
@@ -287,12 +262,13 @@ def new_scratch(tables: SimulationTables) -> Scratch:
 
 
 def _needed_aids(setup: FlightSetup, database: Database) -> tuple[SwitchName, ...]:
+    options = setup.options
     needed: list[SwitchName] = []
-    if setup.plant != "nonlinear" and not moves_flaps(database):
+    if options.plant != "nonlinear" and not moves_flaps(database):
         needed.append("automatic_flaps")
-    if setup.plant != "nonlinear" and not turns_rotors(database):
+    if options.plant != "nonlinear" and not turns_rotors(database):
         needed.append("governor")
-    for name, on in (("automatic_flaps", setup.automatic_flaps), ("governor", setup.governor)):
+    for name, on in (("automatic_flaps", options.automatic_flaps), ("governor", options.governor)):
         if name in needed and not on:
             raise needed_aid_error(name)
     return tuple(needed)
@@ -321,9 +297,10 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         parts: Its parts.
         air_normals: Three standard normals: the turbulence at the start.
     """
+    options = setup.options
     airspeed, nacelle, _ = _start(setup)
     clock = np.zeros(CLOCK.size)
-    clock[CLOCK.mode] = MODES[setup.pilot]
+    clock[CLOCK.mode] = MODES["mocm" if options.mocm_begins else "external"]
     u = parts.start_u.copy()
     u[INPUT.nacelle_rate :] = 0.0
     held = np.full(HELD.size, np.nan)
@@ -337,7 +314,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         level=new_level_state(),
         pilot=np.zeros(interpreted(pilot_state_size)(parts.tables.pilot)),
         aids=np.zeros(AID_STATE_SIZE),
-        switches=switches_of(setup.aids),
+        switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
         drive=np.zeros(DRIVE_STATE_SIZE),
         gusts=new_gust_state(setup.air, air_normals),
@@ -347,11 +324,11 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         script=new_script_state(),
         clock=clock,
     )
-    state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(setup.automatic_flaps), float(setup.governor)
+    state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(options.automatic_flaps), float(options.governor)
     state.flaps[FLAP_FOLLOWS], state.flaps[FLAP_SETTING] = 1.0, NO_SETTING
     state.drive[GOVERNED] = 1.0
     interpreted(law_start)(parts.tables.protection, state.protection)
-    if setup.aids:
+    if options.aids:
         state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
     return state
 
@@ -378,7 +355,7 @@ def prepare(
         InputError: The start has no trim, or something that was asked for does not exist.
     """
     parts = build_parts(setup) if parts is None else parts
-    streams = new_streams(setup.seed)
+    streams = new_streams(setup.options.seed)
     flying = Flying(
         parts.tables,
         start_state(setup, parts, streams[1].standard_normal(3)),
@@ -402,10 +379,10 @@ def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
         setup: What it was set up with.
         parts: Its parts.
     """
-    flying.streams = new_streams(setup.seed)
+    flying.streams = new_streams(setup.options.seed)
     flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
     flying.do(frames_of.DISTURB)
     flying.engage()
 
 
-__all__ = ["FlightSetup", "Parts", "Plant", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]
+__all__ = ["FlightSetup", "Parts", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]

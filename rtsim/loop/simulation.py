@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import SWITCHES, SwitchName, switch_of
+from rtsim.aids import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
 from rtsim.atmosphere import Gust, Turbulence
 from rtsim.atmosphere.air import add_gust, set_turbulence
+from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
 from rtsim.faults import Fault, FaultSwitch
@@ -20,7 +21,7 @@ from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
 from rtsim.kernels.compiled import interpreted
-from rtsim.loop.data import CLOCK, END_REASONS, MODES, STATION, TARGET, PilotMode, SimulationState
+from rtsim.loop.data import CLOCK, END_REASONS, MODES, STATION, TARGET, SimulationState
 from rtsim.loop.flying import WHOLE, Flying
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
@@ -34,7 +35,7 @@ from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_s
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
 
-__all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "PilotMode", "Programme", "Simulation", "Snapshot"]
+__all__ = ["END_REASONS", "MODES", "Disturbance", "FlightSetup", "Programme", "Simulation", "Snapshot"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,8 @@ class Simulation:
         self._state, self._scratch = self.flying.state, self.flying.scratch
         self._observed = True
         if laws is None:
-            chain = load_laws(setup.protection, boundary=setup.protection_boundary, database=setup.database)
+            options = setup.options
+            chain = load_laws(options.protection, boundary=options.corridor_name, database=options.database)
             laws = LawChain(chain, dt=self.tables.dt) if compiled_law(chain) is None else None
         self.laws = laws
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""

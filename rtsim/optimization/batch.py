@@ -84,11 +84,11 @@ class BatchFlyer:
         Args:
             flight: The flight.
         """
-        seed = self.setup.seed if flight.seed is None else flight.seed
-        setup = dataclasses.replace(self.setup, programme=flight.programme, seed=seed)
+        seed = self.setup.options.seed if flight.seed is None else flight.seed
+        setup = dataclasses.replace(self.setup.with_options(seed=seed), programme=flight.programme)
         merit = np.zeros(kernels.MERIT_SIZE)
         flying = prepare(setup, measure=(kernels.add_merit, merit), unlocked=True)
         duration = flight.programme.duration if flight.duration is None else flight.duration
-        flying.run(max(1, math.ceil(duration * self.setup.rate_hz - 1e-6)))
+        flying.run(max(1, math.ceil(duration * self.setup.options.rate_hz - 1e-6)))
         merit[kernels.END_CODE] = flying.state.clock[CLOCK.end]
         return figures_from_sums(merit, flying.tables.dt)

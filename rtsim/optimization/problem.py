@@ -11,6 +11,8 @@ import numpy as np
 
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.frame import FloatArray
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup
 from rtsim.measures.figures import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
@@ -80,11 +82,7 @@ class ConversionProblem:
         start = self.path(np.full(self.variables, 0.5))
         self.setup = FlightSetup(
             programme=start.programme(spec.flight.altitude_m),
-            plant=spec.flight.plant,
-            outer_loop=spec.flight.outer_loop,
-            corridor=spec.flight.corridor,
-            rate_hz=spec.flight.rate_hz,
-            pilot_noise=noise,
+            options=FlightOptions(**given(spec.flight), protection="off", pilot_noise=noise),
             air=air,
         )
         self._flyer = BatchFlyer(self.setup, workers=workers)
@@ -226,7 +224,7 @@ class ConversionProblem:
             pitch / tight.pitch_deg - 1.0,
             flight.airspeed_max_error_kt / tight.airspeed_error_kt - 1.0,
             flight.flapping_peak_deg / tight.flapping_deg - 1.0,
-            flight.controls_on_stop_frames / self.spec.flight.rate_hz,
+            flight.controls_on_stop_frames / self.setup.options.rate_hz,
             max(abs(flight.airspeed_final_kt - FINAL_AIRSPEED_KT) - arrival, flight.nacelle_final_deg - 0.5),
             flight.duration_s / limits.duration_s - 1.0 if limits.duration_s is not None else 0.0,
             flight.mast_torque_max_inlb / limits.mast_torque_inlb - 1.0 if limits.mast_torque_inlb is not None else 0.0,

@@ -40,12 +40,9 @@ def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
     spec = problem.spec
     # What a robust search asked for in turbulence is all that is known to hold; in calm air it holds all the more.
     limits = spec.robust if spec.robust.flights else spec.limits
-    flight: dict[str, str | int | float | bool] = {
-        "plant": spec.flight.plant,
-        "outer_loop": spec.flight.outer_loop,
-        "corridor": spec.flight.corridor,
-        "rate_hz": spec.flight.rate_hz,
-    }
+    flown = problem.setup.options
+    said = ("plant", "outer_loop", "rate_hz", *(("database",) if flown.database else ()))
+    flight = {"corridor": flown.corridor_name, **{key: flown.shown()[key] for key in said}}
     expectations = (
         ("keeps its distance to the corridor's boundaries", "corridor.worst_margin_kt", limits.margin_kt, None),
         ("holds altitude", "altitude_m.max_deviation", None, limits.altitude_m),
@@ -84,10 +81,8 @@ def nonlinear_check(problem: ConversionProblem, path: ConversionPath) -> FlightF
     """
     altitude = problem.spec.flight.altitude_m
     setup = dataclasses.replace(
-        problem.setup,
+        problem.setup.with_options(plant="nonlinear", pilot_noise=False),
         programme=path.programme(altitude),
-        plant="nonlinear",
-        pilot_noise=False,
         air=type(problem.setup.air)(),
     )
     return BatchFlyer(setup, workers=1).fly_one(BatchFlight(path.programme(altitude)))

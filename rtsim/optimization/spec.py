@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from rtsim.errors import InputError
+from rtsim.loop.option_tables import table_fields
+from rtsim.loop.options import declared
 from rtsim.optimization.path import AccelerationCaps
 from rtsim.optimization.paths import FAST_SIDE_CAPS, NEAR_STALL_CAPS, PATH_NAMES
 
@@ -76,13 +78,16 @@ class SearchTable(_Strict):
     start_from: list[PathName] = ["typical", "near_stall", "centre_line", "centre_line_variable", "fast_side"]
 
 
-class FlightTable(_Strict):
+_OPTIONS: Any = create_model(
+    "_OPTIONS",
+    __base__=_Strict,
+    **table_fields(declared()[name] for name in ("plant", "outer_loop", "corridor", "rate_hz", "database")),
+)
+
+
+class FlightTable(_OPTIONS):  # type: ignore[misc]  # made from the options' declaration
     """``[flight]``: what flies."""
 
-    plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
-    outer_loop: Literal["integrators", "pi"] = "integrators"
-    corridor: Literal["design", "flight"] = "design"
-    rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
     altitude_m: Annotated[float, Field(ge=10.0, le=10_000.0)] = 100.0
 
 
@@ -167,6 +172,9 @@ def load_spec(path: str | Path, changes: Mapping[str, Any] | None = None) -> Sea
         raise InputError(f"is not valid TOML: {error}", file=str(path), mend="correct this line") from None
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+    flight = data.get("flight")
+    if isinstance(flight, dict) and isinstance(flight.get("database"), str):  # it lies beside the file
+        flight["database"] = str((file.parent / flight["database"]).resolve())
     return checked_spec(data, changes, file=str(path))
 
 

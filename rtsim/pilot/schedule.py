@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 
+from rtsim.choices import OuterLoop
 from rtsim.lpv.database import JACOBIAN_BITS, Database, PilotArrays, round_mantissa
 from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
 from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem, build_problem
 from rtsim.pilot.weights import PilotSettings
 
-OuterLoop = Literal["integrators", "pi"]
-OUTER_LOOPS: tuple[OuterLoop, ...] = get_args(OuterLoop)
-"""How airspeed and altitude are held: integrators inside the design (default), or the paper's outer PI loops."""
 ARRAYS = ("A", "B", "C", "nacelle_effect", "l", "G2", "F", "V_y", "V_u", "g", "valid")
 """Arrays of a scheduled pilot, leading axes [airspeed, nacelle]."""
 

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from rtsim.choices import OuterLoop
 from rtsim.errors import InputError
 from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
@@ -14,7 +15,7 @@ from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
 from rtsim.pilot.layout_kernels import PilotTables, noise_width, pilot_state_size
 from rtsim.pilot.problem import FloatArray
-from rtsim.pilot.schedule import OuterLoop, ScheduledPilot
+from rtsim.pilot.schedule import ScheduledPilot
 
 __all__ = ["PilotTables", "load_pilot_tables", "noise_width", "pack_pilot", "pilot_state_size"]
 

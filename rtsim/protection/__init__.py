@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rtsim.protection.boundary import BOUNDARY_NAMES, check_consistency, load_boundary
+    from rtsim.protection.boundary import check_consistency, load_boundary
     from rtsim.protection.chain import LawChain, LawEvent, compiled_law
     from rtsim.protection.laws import BuiltInLaw, LawSpec, load_law, load_laws
     from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, Limits, load_limits
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from rtsim.protection.tables import LAW_NAMES, law_tables
 
 _HOME = {
-    "BOUNDARY_NAMES": "boundary",
     "check_consistency": "boundary",
     "load_boundary": "boundary",
     "LawChain": "chain",
@@ -38,7 +37,6 @@ _HOME = {
 }
 
 __all__ = [
-    "BOUNDARY_NAMES",
     "LAW_NAMES",
     "LIMIT_KINDS",
     "LIMIT_WORDS",

@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from rtsim.corridor import CORRIDOR_NAMES, Boundary, Corridor, load_corridor
+from rtsim.choices import CORRIDOR_NAMES
+from rtsim.corridor import Boundary, Corridor, load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
@@ -16,9 +17,6 @@ from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import Limits, load_limits
 from rtsim.units import deg, to_deg, to_kt
 
-BoundaryName = Literal["design", "flight", "model"]
-BOUNDARY_NAMES: tuple[BoundaryName, ...] = (*CORRIDOR_NAMES, "model")
-"""``design`` (TM X-62407), ``flight`` (TM 81244 power-on stall), ``model`` (computed from the LPV database)."""
 MODEL_PITCH = deg(15.0)
 """Nose-up attitude of a level trim at which the computed low-speed side begins; the design chart's is 12 to 16 deg."""
 NO_LIMIT = 1e6
@@ -113,8 +111,8 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
     Raises:
         InputError: There is no such boundary.
     """
-    if name not in BOUNDARY_NAMES:
-        raise InputError("no such boundary", key="corridor", value=name, allowed=", ".join(BOUNDARY_NAMES))
+    if name not in CORRIDOR_NAMES:
+        raise InputError("no such boundary", key="corridor", value=name, allowed=", ".join(CORRIDOR_NAMES))
     if name != "model":
         return load_corridor(name)
     if database is None:

@@ -10,13 +10,13 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from rtsim.choices import CorridorName
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels, limiter_kernels
-from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.law_data import LawSettings
 from rtsim.protection.limits import LIMIT_KINDS, load_limits
 from rtsim.protection.monitor import sensor_array
@@ -44,7 +44,7 @@ class BuiltInLaw:
         self,
         law: str,
         *,
-        boundary: BoundaryName = "flight",
+        boundary: CorridorName = "flight",
         database: Database | None = None,
         settings: LawSettings | None = None,
     ) -> None:
@@ -60,7 +60,7 @@ class BuiltInLaw:
             InputError: There is no such law.
         """
         self.name = law
-        self._boundary: BoundaryName = boundary
+        self._boundary: CorridorName = boundary
         self._settings = settings
         self._database = load_database() if database is None else database
         self._tables = law_tables(law, self._database, dt=0.02, boundary=boundary, settings=settings)
@@ -170,7 +170,7 @@ class LawSpec:
 
     name: str
     """Built-in name, entry point or ``MODULE:CLASS``."""
-    boundary: BoundaryName = "flight"
+    boundary: CorridorName = "flight"
     """Corridor that a built-in law keeps to."""
     database: str = ""
     """LPV database of the aircraft that a built-in law knows, a file; empty: the shipped XV-15."""
@@ -197,7 +197,7 @@ class LawSpec:
         return cast("ProtectionLaw", make_plugin(target, self.name, LAW_PLUGIN))
 
 
-def load_law(name: str, *, boundary: BoundaryName = "flight", database: str = "") -> LawSpec:
+def load_law(name: str, *, boundary: CorridorName = "flight", database: str = "") -> LawSpec:
     """Find a law by name.
 
     Args:
@@ -219,7 +219,7 @@ def load_law(name: str, *, boundary: BoundaryName = "flight", database: str = ""
 
 
 def load_laws(
-    names: str | Sequence[str], *, boundary: BoundaryName = "flight", database: str = ""
+    names: str | Sequence[str], *, boundary: CorridorName = "flight", database: str = ""
 ) -> tuple[LawSpec, ...]:
     """Find a chain of laws.
 

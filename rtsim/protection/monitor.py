@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.choices import CorridorName
 from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor import LEVEL_NAMES
 from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
-from rtsim.protection.boundary import BoundaryName, load_boundary, model_corridor
+from rtsim.protection.boundary import load_boundary, model_corridor
 from rtsim.protection.limits import LIMIT_KINDS, load_limits, protection_data
 from rtsim.protection.monitor_kernels import KIND_COUNT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
@@ -92,7 +93,7 @@ class MarginMonitor:
     """Watches every limit; the same kernels serve single instants and whole flights."""
 
     def __init__(
-        self, boundary: BoundaryName = "flight", *, database: Database | None = None, dt: float = 0.004
+        self, boundary: CorridorName = "flight", *, database: Database | None = None, dt: float = 0.004
     ) -> None:
         """Load limits and boundaries.
 

@@ -6,10 +6,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from rtsim.choices import CorridorName
 from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
-from rtsim.protection.boundary import BoundaryName, guarded_corridor, load_boundary
+from rtsim.protection.boundary import guarded_corridor, load_boundary
 from rtsim.protection.law_data import LawSettings, ProtectionTables
 from rtsim.protection.limits import frames_per_decision, load_limits, load_settings, load_weights
 from rtsim.protection.model import reduce_model
@@ -28,7 +29,7 @@ def law_tables(
     database: Database,
     *,
     dt: float,
-    boundary: BoundaryName = "flight",
+    boundary: CorridorName = "flight",
     settings: LawSettings | None = None,
 ) -> ProtectionTables:
     """Prepare a built-in law for the kernels.

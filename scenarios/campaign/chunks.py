@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
+from rtsim.choices import CorridorName
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
-from rtsim.protection.boundary import BoundaryName
+from rtsim.loop.options import FlightOptions
 from rtsim.protection.laws import LawSpec, load_laws
 from rtsim.protection.tables import LAW_NAMES
 from rtsim.units import kt
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.spec import CampaignFile, parse_campaign
-from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
+from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
 from scenarios.campaign.trial_kernels import METRIC_COUNT
 
 CHUNK_RUNS = 10
@@ -57,10 +58,8 @@ class Task:
     """Laws, each flown on every run."""
     seed: int
     """The campaign's seed."""
-    plant: str
-    """Aircraft model."""
-    rate_hz: int
-    """Frames per second."""
+    options: FlightOptions
+    """What all flights have in common."""
     folder: str = ""
     """Where modules of laws are looked for besides the installed ones."""
 
@@ -115,13 +114,13 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
         chunk: The piece.
     """
     spec = _spec(task.text, task.file)
-    bench = _bench(task.plant, spec.corridor, task.rate_hz)
+    bench = Bench()
     metrics = np.zeros((chunk.count, len(task.laws), METRIC_COUNT))
     seconds = np.zeros(len(task.laws))
     problems: list[tuple[int, int, str]] = []
     for k in range(chunk.count):
         run = chunk.first + k
-        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run)
+        plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run, options=task.options)
         for number, law in enumerate(task.laws):
             begin = time.process_time()
             # The first run of every class asks laws in Python everything twice.
@@ -148,13 +147,14 @@ def fly_law(
     if law.compiled:
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
-        return bench.fly(plan, _python_laws(law.name, folder, bench.corridor), repeat=repeat, keep=keep)
+        laws = _python_laws(law.name, folder, plan.setup.options.corridor or TRIAL_CORRIDOR)
+        return bench.fly(plan, laws, repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
 
 
-def law_chain(name: str, folder: str, boundary: BoundaryName = "flight") -> Sequence[LawSpec]:
+def law_chain(name: str, folder: str, boundary: CorridorName = "flight") -> Sequence[LawSpec]:
     """Find a law, or several separated by commas.
 
     Args:
@@ -173,7 +173,7 @@ def law_chain(name: str, folder: str, boundary: BoundaryName = "flight") -> Sequ
 
 
 @functools.lru_cache(maxsize=8)
-def _python_laws(name: str, folder: str, boundary: BoundaryName) -> Sequence[LawSpec]:
+def _python_laws(name: str, folder: str, boundary: CorridorName) -> Sequence[LawSpec]:
     return law_chain(name, folder, boundary)
 
 
@@ -183,11 +183,6 @@ def _spec(text: str, file: str) -> CampaignFile:
     if spec is None:
         raise problems[0]
     return spec
-
-
-@functools.lru_cache(maxsize=4)
-def _bench(plant: str, corridor: str, rate_hz: int) -> Bench:
-    return Bench(plant=plant, corridor=corridor, rate_hz=rate_hz)  # type: ignore[arg-type]  # the file was checked
 
 
 def present_folder() -> str:

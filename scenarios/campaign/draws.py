@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+from typing import Any
 
 import numpy as np
 
@@ -10,12 +12,15 @@ from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.corridor import Corridor
 from rtsim.errors import InputError
 from rtsim.faults import Fault
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
+from rtsim.loop.setup import FlightSetup
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
 from rtsim.units import deg, kt
-from scenarios.campaign.spec import CampaignFile, ClassTable, Generator, PulseDraw, draw
+from scenarios.campaign.spec import CLASS_OPTIONS, CampaignFile, ClassTable, Generator, PulseDraw, draw
 from scenarios.campaign.trial import FlightPlan, has_trim
 from scenarios.files.loader import load_scenario
 
@@ -23,7 +28,9 @@ ATTEMPTS = 200
 """Starts drawn before a class is said to have none inside the corridor."""
 
 
-def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> FlightPlan:
+def draw_plan(
+    spec: CampaignFile, *, seed: int, class_number: int, run: int, options: FlightOptions | None = None
+) -> FlightPlan:
     """Draw one flight.
 
     Args:
@@ -31,6 +38,7 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
         seed: Its seed.
         class_number: Place of the class in the campaign.
         run: Number of the run within the class.
+        options: What all flights have in common; None: what the campaign's file says.
 
     Raises:
         InputError: No start of the class lies inside the corridor.
@@ -50,21 +58,30 @@ def draw_plan(spec: CampaignFile, *, seed: int, class_number: int, run: int) -> 
     gusts = tuple(_gusts(item, generator))
     severity = draw(item.turbulence_kt, generator)
     turbulence = Turbulence(wind_at_20_ft=kt(severity)) if severity > 0.0 else None
-    wind = kt(draw(item.wind_kt, generator))
+    drawn = _options(item, generator)
     yields = generator.random() < item.pilot.yields
     reaction = draw(item.pilot.reaction_s, generator)
-    return FlightPlan(
+    drawn |= {"pilot_noise": item.pilot.noise, "seed": int(generator.integers(2**62))}
+    setup = FlightSetup(
         programme=programme,
+        options=dataclasses.replace(options or FlightOptions(**given(spec)), **drawn),
         start=start,
-        duration=duration,
-        pulses=pulses,
-        reaction=reaction if yields else None,
         air=AirSpecification(turbulence=turbulence, gusts=gusts),
         faults=faults,
-        wind=wind,
-        pilot_noise=item.pilot.noise,
-        seed=int(generator.integers(2**62)),
+        pulses=pulses,
+        reaction=reaction if yields else None,
     )
+    return FlightPlan(setup, duration)
+
+
+def _options(item: ClassTable, generator: Generator) -> dict[str, Any]:
+    """Options that a class gives, in the order in which they are declared; numbers are drawn."""
+    values = {option: getattr(item, option.key) for option in CLASS_OPTIONS}
+    return {
+        option.name: option.inside(draw(value, generator) if option.is_number else value)
+        for option, value in values.items()
+        if value is not None
+    }
 
 
 def _start(item: ClassTable, corridor_name: str, generator: Generator) -> ProgrammePoint:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ import numpy as np
 
 import rtsim
 from rtsim.errors import InputError
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from scenarios.campaign.chunks import (
     ChunkResult,
     LawVariant,
@@ -45,10 +47,8 @@ class CampaignOptions:
     """Runs of every class; None: the file's."""
     seed: int = 0
     """Seed of every draw."""
-    plant: str | None = None
-    """Aircraft model; None: the file's."""
-    rate_hz: int | None = None
-    """Frames per second; None: the file's."""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """Options of all flights instead of the file's, by field of ``FlightOptions``, SI."""
     early_stop: bool = True
     """End as soon as the verdict is certain."""
     folder: Path | None = None
@@ -93,9 +93,9 @@ class CampaignResult:
             "campaign": self.spec.name,
             "law": self.task.laws[0].label,
             "seed": self.task.seed,
-            "plant": self.task.plant,
-            "corridor_name": self.spec.corridor,
-            "rate_hz": self.task.rate_hz,
+            "plant": self.task.options.plant,
+            "corridor_name": self.task.options.corridor_name,
+            "rate_hz": self.task.options.rate_hz,
             "runs": flown,
             "runs_planned": sum(self.flights.planned),
             "flights": flown * len(self.flights.laws),
@@ -220,7 +220,7 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
         file: Where it came from.
 
     Raises:
-        InputError: A law does not exist, or the plant's name is wrong.
+        InputError: A law does not exist, or an option is out of range.
     """
     tested = options.law or spec.law
     against = spec.against if options.against is None else list(options.against)
@@ -246,8 +246,7 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
         file=file,
         laws=(*laws, LawVariant("off")),
         seed=options.seed,
-        plant=options.plant or spec.plant,
-        rate_hz=options.rate_hz or spec.rate_hz,
+        options=FlightOptions(**given(spec, file)).changed(options.changes),
         folder=folder,
     )
 
@@ -266,10 +265,10 @@ def identity(task: Task) -> dict[str, Any]:
         "laws": [law.label for law in task.laws],
         "law_code": _law_code(task.laws, task.folder),
         "seed": task.seed,
-        "plant": task.plant,
-        "rate_hz": task.rate_hz,
+        "plant": task.options.plant,
+        "rate_hz": task.options.rate_hz,
         "metrics": METRIC_COUNT,
-        "database": load_database().content_hash,
+        "database": load_database(task.options.database or None).content_hash,
         "versions": versions() | {"rtsim": rtsim.__version__},
     }
 

@@ -8,15 +8,17 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from rtsim.choices import CorridorName
 from rtsim.errors import InputError
+from rtsim.loop.option_tables import table_fields
+from rtsim.loop.options import declared
 from rtsim.plugins import closest, suggestion
 from scenarios.files.problems import explain
-from scenarios.files.scenario import CorridorName
 from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
 from scenarios.verdicts.events import EVENTS
 
@@ -28,6 +30,10 @@ MAX_FILE_BYTES = 1_000_000
 
 LARGEST_SWITCH_DEG_S = 12.0
 """Largest nacelle rate that a switch may ask for [deg/s]."""
+FILE_OPTIONS = tuple(item for item in declared().values() if item.campaign == "file")
+"""Options of a flight that a campaign gives once."""
+CLASS_OPTIONS = tuple(item for item in declared().values() if item.campaign == "classes")
+"""Options of a flight that each class gives; numbers may be distributions."""
 RANGES: dict[str, tuple[float, float]] = {
     "nacelle_deg": (0.0, 90.0),
     "target_deg": (0.0, 90.0),
@@ -42,10 +48,9 @@ RANGES: dict[str, tuple[float, float]] = {
     "reaction_s": (0.0, 3600.0),
     "bias_kt": (-100.0, 100.0),
     "turbulence_kt": (0.0, 100.0),
-    "wind_kt": (-100.0, 100.0),
     "ahead_kt": (-200.0, 200.0),
     "below_kt": (-200.0, 200.0),
-}
+} | {item.key: (item.low, item.high) for item in CLASS_OPTIONS if item.low is not None and item.high is not None}
 """What numbers and the certain part of distributions must lie in, by key."""
 
 
@@ -148,7 +153,11 @@ class PilotDraw(Strict):
     noise: bool = False
 
 
-class ClassTable(Strict):
+_ClassOptions: Any = create_model("_ClassOptions", __base__=Strict, **table_fields(CLASS_OPTIONS, number=Number))
+_FileOptions: Any = create_model("_FileOptions", __base__=Strict, **table_fields(FILE_OPTIONS))
+
+
+class ClassTable(_ClassOptions, Strict):  # type: ignore[misc]  # made from the options' declaration
     """One of ``[[classes]]``: a kind of flight."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=60)]
@@ -166,7 +175,6 @@ class ClassTable(Strict):
     faults: list[FaultDraw] = []
     gusts: list[GustDraw] = []
     turbulence_kt: Number = 0.0
-    wind_kt: Number = 0.0
     pilot: PilotDraw = PilotDraw()
 
 
@@ -182,7 +190,7 @@ class ExpectRate(Strict):
     rate_min: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
 
 
-class CampaignFile(Strict):
+class CampaignFile(_FileOptions, Strict):  # type: ignore[misc]  # made from the options' declaration
     """A whole campaign file."""
 
     format: Literal[1]
@@ -191,9 +199,7 @@ class CampaignFile(Strict):
     description: str = ""
     law: str = "full"
     against: list[str] = []
-    plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
     corridor: CorridorName = "flight"
-    rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
     duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 40.0
     runs: Annotated[int, Field(ge=1, le=10_000_000)] = 50
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rtsim.atmosphere import AirSpecification
+from rtsim.choices import BUILT_IN_PILOT, CorridorName, PlantName
 from rtsim.errors import InputError
-from rtsim.faults import Fault
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from rtsim.loop.data import SimulationTables
-from rtsim.loop.script import Pulse
 from rtsim.loop.script_kernels import S_YIELDED
-from rtsim.loop.setup import FlightSetup, Plant, build_parts, start_trim
+from rtsim.loop.setup import FlightSetup, build_parts, start_trim
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
-from rtsim.programme import Programme, ProgrammePoint
-from rtsim.protection.boundary import BoundaryName
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import load_limits
@@ -31,40 +27,20 @@ if TYPE_CHECKING:
     from rtsim.command import Pilot
 
 
+TRIAL_CORRIDOR: CorridorName = "flight"
+"""Corridor of trials that name none: laws keep to it and flights are judged by it, with a law and without."""
 BUFFERED = ("reverse_margin", "pass_margin", "blend_begin", "blend_full")
 """Margins of the built-in laws that a buffer is added to."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class FlightPlan:
-    """One flight as it is meant to go, without a law. SI and radians."""
+    """One flight as it is meant to go, whatever law is flown with it."""
 
-    programme: Programme
-    """What the pilot is asked to do."""
-    start: ProgrammePoint
-    """Trimmed condition at frame 0."""
+    setup: FlightSetup
+    """What flies, how and from where, with what its script does."""
     duration: float
     """Length of the flight [s]."""
-    pulses: tuple[Pulse, ...] = ()
-    """What the script does to the controls."""
-    reaction: float | None = None
-    """A pilot who yields: how long a warning lasts before he gives up his plan [s]; None: he never does."""
-    air: AirSpecification = field(default_factory=AirSpecification)
-    """Gusts and turbulence."""
-    faults: tuple[Fault, ...] = ()
-    """Failures."""
-    wind: float = 0.0
-    """Steady tailwind [m/s]."""
-    pilot_noise: bool = False
-    """Noise of the built-in pilot."""
-    outer_loop: Literal["integrators", "pi"] = "integrators"
-    """How the built-in pilot holds airspeed and altitude."""
-    automatic_flaps: bool = True
-    """Whether the flaps follow their schedule."""
-    governor: bool = True
-    """Whether the governor holds the rotor speed."""
-    seed: int = 0
-    """Root of the flight's random streams."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,31 +63,13 @@ class TrialFlight:
 
 
 class Bench:
-    """Flies trials of one plant against one corridor; loads everything once."""
+    """Flies trials; its history is written over by every flight."""
 
-    def __init__(
-        self,
-        *,
-        plant: Plant = "lpv",
-        corridor: BoundaryName = "flight",
-        rate_hz: int = 250,
-    ) -> None:
-        """Remember what to fly; parts are loaded with the first flight.
-
-        Args:
-            plant: Aircraft model.
-            corridor: Boundaries that laws keep to and flights are judged by.
-            rate_hz: Frames per second.
-        """
-        self.plant, self.corridor, self.rate_hz = plant, corridor, rate_hz
+    def __init__(self) -> None:
+        """Make room for a history when there is one."""
         self._rows = np.zeros((0, SIGNAL_COUNT))
         limits = load_limits()
         self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
-
-    @property
-    def dt(self) -> float:
-        """Length of a frame [s]."""
-        return 1.0 / self.rate_hz
 
     def fly(
         self,
@@ -140,15 +98,15 @@ class Bench:
             InputError: The plan's start has no trim, or there is no such law.
         """
         name = law if isinstance(law, str) else compiled_law(law)
-        frames = max(1, int(np.ceil(plan.duration * self.rate_hz - 1e-6)))
-        setup = self._setup(plan, "monitor" if name is None else name, external=pilot is not None)
+        frames = max(1, int(np.ceil(plan.duration * plan.setup.options.rate_hz - 1e-6)))
+        setup = _setup(plan, "monitor" if name is None else name, external=pilot is not None)
         parts = build_parts(setup)
         if buffer:
             parts = dataclasses.replace(parts, tables=_with_buffer(parts.tables, buffer))
         chain = None
         if name is None:
             assert not isinstance(law, str)  # a name is a compiled law
-            chain = LawChain(law, dt=self.dt, remember=repeat)
+            chain = LawChain(law, dt=parts.tables.dt, remember=repeat)
         simulation = Simulation(setup, parts=parts, laws=chain)
         if len(self._rows) < frames:
             self._rows = np.empty((frames, SIGNAL_COUNT))
@@ -160,35 +118,19 @@ class Bench:
             chain.unrepeatable()
         problems = () if chain is None else tuple(event.text for event in chain.events)
         metrics = np.zeros(kernels.METRIC_COUNT)
-        kernels.measure_trial(rows, simulation.tables.programme, self._limits, self.dt, metrics)
+        kernels.measure_trial(rows, simulation.tables.programme, self._limits, simulation.dt, metrics)
         metrics[kernels.M_COMPLETED] = float(not simulation.finished)
         metrics[kernels.M_YIELDED] = simulation.flying.state.script[S_YIELDED]
         return TrialFlight(TrialMetrics(metrics), simulation.end_reason, rows.copy() if keep else rows, problems)
 
-    def _setup(self, plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
-        """What the simulation needs to know of a plan."""
-        return FlightSetup(
-            programme=plan.programme,
-            plant=self.plant,
-            outer_loop=plan.outer_loop,
-            pilot="external" if external else "mocm",
-            corridor=self.corridor,
-            protection=law,
-            protection_boundary=self.corridor,
-            rate_hz=self.rate_hz,
-            start_airspeed=plan.start.airspeed,
-            start_nacelle=plan.start.nacelle_angle,
-            start_altitude=plan.start.altitude,
-            wind=plan.wind,
-            seed=plan.seed,
-            pilot_noise=plan.pilot_noise,
-            automatic_flaps=plan.automatic_flaps,
-            governor=plan.governor,
-            air=plan.air,
-            faults=plan.faults,
-            pulses=plan.pulses,
-            reaction=plan.reaction,
-        )
+
+def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
+    """The plan with a law, flown by the built-in pilot or another, in the corridor that trials are judged by."""
+    return plan.setup.with_options(
+        pilot="external" if external else BUILT_IN_PILOT,
+        protection=law,
+        corridor=plan.setup.options.corridor or TRIAL_CORRIDOR,
+    )
 
 
 def _with_buffer(tables: SimulationTables, buffer: float) -> SimulationTables:
@@ -208,7 +150,7 @@ def _fly_by_hand(simulation: Simulation, pilot: Pilot, rows: FloatArray) -> Floa
     return rows[:flown]
 
 
-def has_trim(plant: Plant, airspeed: float, nacelle: float) -> bool:
+def has_trim(plant: PlantName, airspeed: float, nacelle: float) -> bool:
     """Whether a flight can start somewhere.
 
     Args:

@@ -10,6 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from rtsim.errors import InputError
+from rtsim.loop.option_tables import given
+from rtsim.loop.options import FlightOptions
 from rtsim.measures.metrics import METRIC_NAMES
 from rtsim.plugins import closest, suggestion
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
@@ -109,11 +111,6 @@ def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> Progra
     return ProgrammePoint(airspeed, nacelle_angle, altitude)
 
 
-def _beside(database: str, file: str) -> str:
-    """A database as a path: relative ones lie beside the scenario."""
-    return str((Path(file).parent / database).resolve()) if database else ""
-
-
 def _lower(message: str) -> str:
     return message[:1].lower() + message[1:]
 
@@ -163,7 +160,7 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     if content.programme is not None:
         found += _point_contradictions(content.programme, file)
     found += disturbance_problems(content.air, content.faults, file)
-    found += automatic_problems(content.automatic, content.flight.nacelle, file)
+    found += automatic_problems(content.automatic, given(content.flight).get("nacelle", ""), file)
     found += trial_problems(content.pulses, content.trial, has_events=bool(content.events), file=file)
     for number, clause in enumerate(content.expect):
         key = f"expect[{number}]"
@@ -244,7 +241,6 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
     duration = programme.duration if content.duration_s is None else content.duration_s
     if duration <= 0.0:
         raise InputError("is missing", key="duration_s", mend="add it: a programme of one point has no end of its own")
-    options = content.flight
     return Scenario(
         name=content.name,
         title=content.title,
@@ -252,18 +248,7 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         programme=programme,
         duration=duration,
         start=start,
-        plant=options.plant,
-        outer_loop=options.outer_loop,
-        pilot=options.pilot,
-        corridor=options.corridor,
-        protection=options.protection,
-        rate_hz=options.rate_hz,
-        seed=options.seed,
-        wind=kt(options.wind_kt),
-        pilot_noise=options.pilot_noise,
-        aids=tuple(dict.fromkeys(options.aids)),
-        automatic_flaps=options.automatic_flaps,
-        governor=options.governor,
+        options=FlightOptions(**given(content.flight, file)),
         air=air_of(content.air),
         faults=faults_of(content.faults),
         events=tuple(
@@ -274,8 +259,6 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         ),
         source=text,
         file=file,
-        nacelle=options.nacelle,
-        database=_beside(options.database, file),
         automatic=automatic_settings(content.automatic),
         pulses=pulses_of(content.pulses),
         trial=trial_of(content.trial),

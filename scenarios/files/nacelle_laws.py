@@ -28,8 +28,6 @@ NACELLE_PLUGIN = PluginKind(
     page="rtsim.command.NacelleLaw",
 )
 """A nacelle law as plug-in."""
-NacelleName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$", min_length=1, max_length=200)]
-"""``programme``, ``automatic``, the name of an entry point, or ``MODULE:CLASS``."""
 Schedule = Literal["centre-line", "programme", "points"]
 NacelleLawFactory = Callable[[], NacelleLaw]
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
+from typing import Any
 
 from rtsim.atmosphere.specification import Severity, Turbulence
+from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
+from rtsim.loop.options import declared
 from rtsim.programme import AIRSPEED_RANGE, ALTITUDE_RANGE, NACELLE_RANGE, Programme, ProgrammePoint
 from rtsim.units import kt, to_deg, to_kt
 from scenarios.files.loader import load_scenario, named_start
-from scenarios.files.scenario import DEFAULT_ALTITUDE, CorridorName, OuterLoop, PlantName, Scenario
-from scenarios.flight.pilots import HAND_PILOT
+from scenarios.files.scenario import DEFAULT_ALTITUDE, Scenario
 
 DEFAULT_SCENARIO = "typical_conversion"
 """What ``rtsim fly`` flies when nothing is named."""
@@ -20,36 +22,31 @@ HOLD_DURATION = 60.0
 """Length of a flight that only holds its start [s]."""
 JOIN_TOLERANCE = (kt(0.5), math.radians(0.5))
 """How near a start must be to a programme to join it: airspeed [m/s], nacelle angle [rad]."""
-RATE_RANGE = (50, 1000)
-"""Frame rates that can be flown [Hz]."""
-WIND_RANGE = (kt(-40.0), kt(40.0))
-"""Steady winds that can be flown in [m/s]."""
+_OptionChanges: Any = make_dataclass(
+    "_OptionChanges", [(name, Any, None) for name in declared()], frozen=True, slots=True, kw_only=True
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Overrides:
-    """What to change; None leaves the scenario's own. SI and radians."""
+class Overrides(_OptionChanges):  # type: ignore[misc]  # made from the options' declaration
+    """What to change; None leaves the scenario's own. SI and radians.
 
-    plant: PlantName | None = None
-    outer_loop: OuterLoop | None = None
-    pilot: str | None = None
-    protection: str | None = None
-    database: str | None = None
-    nacelle: str | None = None
-    """Who sets the nacelle rate: ``programme``, ``automatic`` or MODULE:CLASS."""
-    corridor: CorridorName | None = None
-    rate_hz: int | None = None
-    seed: int | None = None
-    wind: float | None = None
+    Besides the fields below, every field of :class:`~rtsim.loop.options.FlightOptions`.
+    """
+
     turbulence: Severity | None = None
     """Dryden turbulence in place of the scenario's; its gusts stay."""
-    pilot_noise: bool | None = None
     duration: float | None = None
     start: str | None = None
     """Named start: ``hover``, ``conversion`` or ``cruise``."""
     airspeed: float | None = None
     nacelle_angle: float | None = None
     altitude: float | None = None
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options to change, by field."""
+        return {name: getattr(self, name) for name in declared() if getattr(self, name) is not None}
 
     @property
     def moves_start(self) -> bool:
@@ -88,26 +85,14 @@ def with_overrides(scenario: Scenario, overrides: Overrides) -> Scenario:
     return _with_options(_displaced(scenario, overrides), overrides)
 
 
-_PLAIN = (
-    "plant", "outer_loop", "pilot", "protection", "corridor", "database", "rate_hz", "seed", "wind", "pilot_noise",
-)  # fmt: skip
-"""Fields of a scenario that an override replaces as they are."""
-
-
 def _with_options(scenario: Scenario, overrides: Overrides) -> Scenario:
     """Apply everything but the start."""
-    plain = {name: getattr(overrides, name) for name in _PLAIN if getattr(overrides, name) is not None}
-    changed = dataclasses.replace(scenario, **plain)
-    if overrides.nacelle is not None:
-        changed = dataclasses.replace(changed, nacelle=overrides.nacelle)
+    changed = scenario.with_options(**overrides.options)
     if overrides.turbulence is not None:
         turbulence = Turbulence.of_severity(overrides.turbulence)
         changed = dataclasses.replace(changed, air=dataclasses.replace(changed.air, turbulence=turbulence))
-    _check_range("--rate", changed.rate_hz, RATE_RANGE, "Hz")
-    _check_range("--wind-kt", changed.wind, WIND_RANGE, "kn", unit=kt(1.0))
-    _check_range("--seed", changed.seed, (0, 2**63 - 1), "")
     if overrides.duration is not None:
-        _check_range("--duration", overrides.duration, (1.0 / changed.rate_hz, 36_000.0), "s")
+        _check_range("--duration", overrides.duration, (1.0 / changed.options.rate_hz, 36_000.0), "s")
         if overrides.duration < changed.duration:
             changed = dataclasses.replace(changed, expectations=())
         changed = dataclasses.replace(changed, duration=overrides.duration)
@@ -163,7 +148,7 @@ def _displaced(scenario: Scenario, overrides: Overrides) -> Scenario:
         _check_range("--altitude-m", overrides.altitude, ALTITUDE_RANGE, "m")
         return _raised(scenario, overrides.altitude - scenario.start.altitude)
     start = _start_point(overrides, scenario.start)
-    if scenario.programme.duration == 0.0 and HAND_PILOT in {overrides.pilot, scenario.pilot}:
+    if scenario.programme.duration == 0.0 and HAND_PILOT in {overrides.pilot, scenario.options.pilot}:
         # A hand flight has no programme to join: the virtual pilot holds whatever start is asked for.
         programme = Programme.hold(airspeed=start.airspeed, nacelle_angle=start.nacelle_angle, altitude=start.altitude)
         return dataclasses.replace(scenario, programme=programme, start=start)
@@ -182,7 +167,7 @@ def _displaced(scenario: Scenario, overrides: Overrides) -> Scenario:
         scenario,
         programme=scenario.programme.starting_at(time),
         start=ProgrammePoint(start.airspeed, start.nacelle_angle, scenario.programme.at(time).altitude),
-        duration=max(scenario.duration - time, 1.0 / scenario.rate_hz),
+        duration=max(scenario.duration - time, 1.0 / scenario.options.rate_hz),
         events=tuple(
             dataclasses.replace(event, time=event.time - time) for event in scenario.events if event.time >= time
         ),

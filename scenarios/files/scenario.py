@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any
 
 from rtsim.atmosphere import AirSpecification
+from rtsim.choices import PilotMode
 from rtsim.faults import Fault
+from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
 from scenarios.files.nacelle_laws import AutomaticSettings
 from scenarios.files.trial import Trial
-
-PlantName = Literal["lpv", "lpv-plain", "nonlinear"]
-OuterLoop = Literal["integrators", "pi"]
-CorridorName = Literal["design", "flight", "model"]
-PASSIVE_LAWS = frozenset({"off", "monitor"})
-"""Protection that changes no command."""
-PilotMode = Literal["mocm", "external", "hold"]
-AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
-"""The aids of ``rtsim.aids`` that act on the controls, named here so that reading a file loads no compiled code."""
 
 START_CONDITIONS: dict[str, tuple[float, float]] = {
     "hover": (0.0, deg(90.0)),
@@ -89,26 +83,8 @@ class Scenario:
     """Length of the flight [s]; beyond the programme its last point is held."""
     start: ProgrammePoint
     """Trimmed condition at frame 0."""
-    plant: PlantName
-    outer_loop: OuterLoop
-    pilot: str
-    """``mocm``, an entry point's name, or ``MODULE:CLASS``."""
-    corridor: CorridorName | None
-    """Boundaries to watch; None chooses by the protection."""
-    protection: str
-    """Protection laws by name, in the order in which they act, separated by commas."""
-    rate_hz: int
-    seed: int
-    wind: float
-    """Steady wind along the flight [m/s], tailwind positive."""
-    pilot_noise: bool
-    """Whether the MOCM's motor and observation noise is on."""
-    aids: tuple[AidName, ...]
-    """Pilot aids on at the start; they act on every pilot but the MOCM."""
-    automatic_flaps: bool
-    """Whether the flaps follow their schedule at the start, whoever flies."""
-    governor: bool
-    """Whether the governor holds the rotor speed at the start, whoever flies."""
+    options: FlightOptions
+    """Who flies what."""
     air: AirSpecification
     """Gusts and turbulence."""
     faults: tuple[Fault, ...]
@@ -119,10 +95,6 @@ class Scenario:
     """Text of the file it came from; empty for scenarios made in Python."""
     file: str
     """Where it came from, as shown in messages."""
-    database: str = ""
-    """LPV database that is flown, a file; empty: the shipped XV-15."""
-    nacelle: str = "programme"
-    """Who sets the nacelle rate: ``programme`` (the pilot, as the programme asks), ``automatic``, or MODULE:CLASS."""
     automatic: AutomaticSettings = field(default_factory=AutomaticSettings)
     """Settings of the automatic nacelle control."""
     pulses: tuple[Pulse, ...] = ()
@@ -130,9 +102,10 @@ class Scenario:
     trial: Trial | None = None
     """What makes it a test of envelope protection; None where it is none."""
 
-    @property
-    def corridor_name(self) -> CorridorName:
-        """The corridor in force: ``flight`` with a protection that acts, else ``design``."""
-        if self.corridor is not None:
-            return self.corridor
-        return "design" if self.protection in PASSIVE_LAWS else "flight"
+    def with_options(self, **changes: Any) -> Scenario:
+        """The scenario with other options.
+
+        Args:
+            changes: Values by field of :class:`~rtsim.loop.options.FlightOptions`, SI.
+        """
+        return dataclasses.replace(self, options=self.options.changed(changes))

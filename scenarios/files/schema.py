@@ -7,14 +7,16 @@ layout for people, ``scenarios.files.loader`` turns a checked file into a
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
+from rtsim.choices import PilotMode
 from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
-from scenarios.files.nacelle_laws import AutomaticTable, NacelleName
-from scenarios.files.scenario import AidName, CorridorName
+from rtsim.loop.option_tables import table_fields
+from rtsim.loop.options import declared
+from scenarios.files.nacelle_laws import AutomaticTable
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
 FORMAT = 1
@@ -27,10 +29,6 @@ DurationS = Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
 AccelerationKtS = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 NacelleRateDegS = Annotated[float, Field(ge=0.1, le=12.0, allow_inf_nan=False)]
 ClimbRateMS = Annotated[float, Field(ge=0.1, le=15.0, allow_inf_nan=False)]
-_PLUG_IN = r"[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?"
-PilotName = Annotated[str, Field(pattern=rf"^{_PLUG_IN}$", max_length=200)]
-ProtectionName = Annotated[str, Field(pattern=rf"^{_PLUG_IN}( *, *{_PLUG_IN})*$", max_length=1000)]
-"""Laws in the order in which they act: ``off``, ``monitor``, ``governor``, ``full``, entry points, MODULE:CLASS."""
 
 
 class Strict(BaseModel):
@@ -39,23 +37,12 @@ class Strict(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
-class FlightTable(Strict):
-    """``[flight]``: who flies what; the command line can override each of these."""
-
-    plant: Literal["lpv", "lpv-plain", "nonlinear"] = "lpv"
-    outer_loop: Literal["integrators", "pi"] = "integrators"
-    pilot: PilotName = "mocm"
-    corridor: CorridorName | None = None
-    protection: ProtectionName = "monitor"
-    nacelle: NacelleName = "programme"
-    database: Annotated[str, Field(max_length=1000)] = ""
-    rate_hz: Annotated[int, Field(ge=50, le=1000)] = 250
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
-    wind_kt: Annotated[float, Field(ge=-40.0, le=40.0, allow_inf_nan=False)] = 0.0
-    pilot_noise: bool = False
-    aids: list[AidName] = []
-    automatic_flaps: bool = True
-    governor: bool = True
+FlightTable: Any = create_model(
+    "FlightTable",
+    __base__=Strict,
+    __doc__="``[flight]``: who flies what; the command line can override each of these.",
+    **table_fields(declared().values()),
+)
 
 
 class StartTable(Strict):
@@ -134,7 +121,7 @@ class EventTable(Strict):
 
     time_s: DurationS
     action: Literal["pilot"]
-    pilot: Literal["mocm", "hold", "external"]
+    pilot: PilotMode
 
 
 class ExpectTable(Strict):
@@ -154,7 +141,7 @@ class ScenarioFile(Strict):
     title: Annotated[str, Field(min_length=1, max_length=200)]
     description: str = ""
     duration_s: Annotated[float, Field(gt=0.0, le=36_000.0, allow_inf_nan=False)] | None = None
-    flight: FlightTable = FlightTable()
+    flight: FlightTable = FlightTable()  # made from the options' declaration
     start: StartTable = StartTable()
     programme: ProgrammeTable | None = None
     automatic: AutomaticTable | None = None

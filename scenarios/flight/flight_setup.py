@@ -18,7 +18,6 @@ from rtsim.protection import load_boundary
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import automatic_nacelle
 from scenarios.files.scenario import Scenario
-from scenarios.flight.pilots import load_pilot
 from telemetry.view.corridor_outline import CorridorOutline
 
 
@@ -28,7 +27,7 @@ def flight_frames(scenario: Scenario) -> int:
     Args:
         scenario: What is flown.
     """
-    return max(1, math.ceil(scenario.duration * scenario.rate_hz - 1e-6))
+    return max(1, math.ceil(scenario.duration * scenario.options.rate_hz - 1e-6))
 
 
 def flight_setup(scenario: Scenario) -> FlightSetup:
@@ -39,27 +38,12 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
     """
     return FlightSetup(
         programme=scenario.programme,
-        plant=scenario.plant,
-        outer_loop=scenario.outer_loop,
-        pilot="mocm" if load_pilot(scenario.pilot) is None else "external",
-        corridor=scenario.corridor_name,
-        rate_hz=scenario.rate_hz,
-        start_airspeed=scenario.start.airspeed,
-        start_nacelle=scenario.start.nacelle_angle,
-        start_altitude=scenario.start.altitude,
-        wind=scenario.wind,
-        seed=scenario.seed,
-        pilot_noise=scenario.pilot_noise,
-        aids=scenario.aids,
-        automatic_flaps=scenario.automatic_flaps,
-        governor=scenario.governor,
+        options=scenario.options,
+        start=scenario.start,
         air=scenario.air,
         faults=scenario.faults,
         pulses=scenario.pulses,
-        automatic_nacelle=automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme),
-        protection=scenario.protection,
-        protection_boundary=scenario.corridor_name,
-        database=scenario.database,
+        automatic_nacelle=automatic_nacelle(scenario.options.nacelle, scenario.automatic, scenario.programme),
     )
 
 
@@ -87,11 +71,7 @@ def replay_setup(scenario: Scenario) -> dict[str, Any]:
     Args:
         scenario: What is flown.
     """
-    return {
-        "flight": setup_to_json(flight_setup(scenario)),
-        "pilot_name": scenario.pilot,
-        "protection": scenario.protection,
-    }
+    return {"flight": setup_to_json(flight_setup(scenario))}
 
 
 def setup_to_json(setup: FlightSetup) -> dict[str, Any]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol, get_args
 
-from rtsim.aids import SWITCHES, SwitchName
+from rtsim.aids import SWITCHES
 from rtsim.aids.aids_kernels import MAP_STICK, scheduled
+from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.loop.simulation import PilotMode, Simulation
+from rtsim.loop.simulation import Simulation
 from rtsim.protection import load_boundary
 from rtsim.realtime import FlightControl, SwitchedFlight
 from rtsim.sticks import INPUT_LIVE, INPUT_NONE, StickHandler, StickSettings, StickSituation, transition_schedule
@@ -53,7 +54,7 @@ class Hands:
         self._settings = StickSettings()
         for name, value in link.config.parameters.items():
             self._settings = self._settings.with_parameter(name, value)
-        self._schedule = transition_schedule(load_boundary(simulation.setup.corridor))
+        self._schedule = transition_schedule(load_boundary(simulation.setup.options.corridor_name))
         self._waits = waits
         self._deferred: list[Request] = []
         self._frames = 0

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Literal
 
 import rtsim
 from rtsim.aids import SWITCHES
+from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
 from rtsim.sticks import StickSettings
 from rtsim.units import deg
-from scenarios.flight.pilots import HAND_PILOT
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
 from telemetry.mavlink import HomePosition, MavlinkConfig
 from telemetry.mavlink.config import endpoints
@@ -67,14 +67,14 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
     targets, host, port, warning = endpoints(options.targets, allow_network=options.allow_network, bind=options.bind)
     stick_map = load_vehicle_map(options.stick_map)
     parameter_file = options.parameter_file or default_parameter_file()
-    always = {"automatic_flaps": scenario.automatic_flaps, "governor": scenario.governor}
-    aids_on = {*scenario.aids, *(name for name, on in always.items() if on)}
+    always = {"automatic_flaps": scenario.options.automatic_flaps, "governor": scenario.options.governor}
+    aids_on = {*scenario.options.aids, *(name for name, on in always.items() if on)}
     config = MavlinkConfig(
         targets=targets,
         bind_host=host,
         bind_port=port,
         autopilot=options.autopilot,
-        rate_hz=float(scenario.rate_hz),
+        rate_hz=float(scenario.options.rate_hz),
         home=options.home,
         aids={name: name in aids_on for name in SWITCHES},
         parameters=stick_settings(stick_map).parameters(),
@@ -129,5 +129,5 @@ def refuse_unpaced(scenario: Scenario, *, paced: bool) -> None:
             key="--speed",
             value="max",
             allowed="multiples of real time",
-            mend="leave --speed out" if flown_by_hand(scenario.pilot) else "leave --mavlink out",
+            mend="leave --speed out" if flown_by_hand(scenario.options.pilot) else "leave --mavlink out",
         )

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import cast
 
+from rtsim.choices import BUILT_IN_PILOT, HAND_PILOT
 from rtsim.command import Pilot
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 
-BUILT_IN_PILOT = "mocm"
-"""The pilot that needs no plug-in."""
-HAND_PILOT = "mavlink"
-"""A person behind MAVLink; the built-in pilot holds the start until the first sticks arrive."""
 PILOT_PLUGIN = PluginKind(
     noun="a pilot",
     option="--pilot",

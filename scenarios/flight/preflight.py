@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 
+from rtsim.choices import BUILT_IN_PILOT
 from rtsim.errors import InputError, RtsimError
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import load_nacelle_law
 from scenarios.files.scenario import START_CONDITIONS, Scenario
 from scenarios.flight.hands import pilot_modes
 from scenarios.flight.mavlink_options import flown_by_hand
-from scenarios.flight.pilots import BUILT_IN_PILOT, load_pilot
+from scenarios.flight.pilots import load_pilot
 
 
 def preflight_problems(scenario: Scenario) -> list[InputError]:
@@ -24,11 +25,11 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
     found = []
     for key, look_up in (("pilot", load_pilot), ("nacelle", load_nacelle_law), ("protection", load_laws)):
         try:
-            look_up(getattr(scenario, key))
+            look_up(getattr(scenario.options, key))
         except InputError as error:
             found.append(_placed(error, scenario, key))
-    plug_in = scenario.pilot != BUILT_IN_PILOT
-    available = pilot_modes(plug_in=plug_in, hands=flown_by_hand(scenario.pilot))
+    plug_in = scenario.options.pilot != BUILT_IN_PILOT
+    available = pilot_modes(plug_in=plug_in, hands=flown_by_hand(scenario.options.pilot))
     for number, event in enumerate(scenario.events):
         if event.pilot not in available:
             found.append(
@@ -57,7 +58,7 @@ def start_problems(scenario: Scenario) -> list[InputError]:
 
     try:
         trimmed = (
-            load_aircraft(scenario.database or None)
+            load_aircraft(scenario.options.database or None)
             .trim(airspeed=start.airspeed, nacelle=start.nacelle_angle)
             .converged
         )
@@ -79,7 +80,7 @@ def start_problems(scenario: Scenario) -> list[InputError]:
 def _placed(error: InputError, scenario: Scenario, key: str) -> InputError:
     """The error where its value stands: in the scenario's file, or else on the command line."""
     table = tomllib.loads(scenario.source).get("flight", {}) if scenario.source else {}
-    if table.get(key) != getattr(scenario, key):
+    if table.get(key) != getattr(scenario.options, key):
         return error
     return InputError(
         error.problem,

@@ -65,7 +65,7 @@ class FlightRecord(Mapping[str, FloatArray]):
     def __repr__(self) -> str:
         """Say what was flown and how it ended; the numbers would be pages."""
         return (
-            f"<FlightRecord {self.scenario.name}: {len(self.rows)} frames at {self.scenario.rate_hz} Hz, "
+            f"<FlightRecord {self.scenario.name}: {len(self.rows)} frames at {self.scenario.options.rate_hz} Hz, "
             f"{self.end_reason}; flight['airspeed_kt'], .metrics, .verdicts, .events>"
         )
 
@@ -102,15 +102,12 @@ class FlightRecord(Mapping[str, FloatArray]):
     def summary(self) -> dict[str, Any]:
         """Everything ``rtsim fly --json`` prints, with its keys."""
         scenario, timing = self.scenario, self.timing
+        options = scenario.options.shown()
         result: dict[str, Any] = {
             "scenario": scenario.name,
-            "pilot": scenario.pilot,
-            "plant": scenario.plant,
-            "outer_loop": scenario.outer_loop,
-            "protection": scenario.protection,
-            "corridor_name": scenario.corridor_name,
-            "rate_hz": scenario.rate_hz,
-            "seed": scenario.seed,
+            **{key: options[key] for key in ("pilot", "plant", "outer_loop", "protection", "rate_hz", "seed")},
+            "corridor_name": scenario.options.corridor_name,
+            "options": options,
             "duration_s": timing.duration_s,
             "wall_s": timing.wall_s,
             "real_time_factor": timing.real_time_factor,

@@ -103,8 +103,8 @@ def fly(
         checked_speed(speed)
     policy = OverrunPolicy.parse(overrun_policy)
     outputs = outputs if outputs is not None else FlightOutputs()
-    pilot_factory = load_pilot(scenario.pilot)
-    nacelle_law = load_nacelle_law(scenario.nacelle)
+    pilot_factory = load_pilot(scenario.options.pilot)
+    nacelle_law = load_nacelle_law(scenario.options.nacelle)
     live = speed != "max"
     control = control if control is not None else FlightControl()
     link: MavlinkLink | None = None
@@ -114,14 +114,14 @@ def fly(
     try:
         link = _start_mavlink(scenario, outputs, live=live)
         simulation = Simulation(flight_setup(scenario))
-        waits = flown_by_hand(scenario.pilot)
+        waits = flown_by_hand(scenario.options.pilot)
         hands = Hands(link, simulation, control=control, waits=waits) if link is not None else None
         session = FlightSession(
             simulation,
             frames=flight_frames(scenario),
             events=scenario.events,
             pilot_factory=pilot_factory,
-            pilot_name=scenario.pilot,
+            pilot_name=scenario.options.pilot,
             hands=hands,
             nacelle_law=nacelle_law,
         )
@@ -130,7 +130,7 @@ def fly(
             log=log,
             view=view,
             mirror=link,
-            watch_corridor=scenario.protection != "off",
+            watch_corridor=scenario.options.protection != "off",
             limits=_limit_watch(scenario, simulation.dt),
             on_rows=outputs.on_rows,
             on_event=_event_listener(outputs, link),
@@ -168,16 +168,16 @@ def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
 
     return RerunView(
         outputs.view,
-        corridor=corridor_outline(scenario.corridor_name, scenario.database),
+        corridor=corridor_outline(scenario.options.corridor_name, scenario.options.database),
         title=scenario.name,
-        rate_hz=scenario.rate_hz,
+        rate_hz=scenario.options.rate_hz,
         on_message=outputs.on_message,
     )
 
 
 def _start_mavlink(scenario: Scenario, outputs: FlightOutputs, *, live: bool) -> MavlinkLink | None:
     """Put the aircraft on the air, in a process that gets ready while this one loads it."""
-    if outputs.mavlink is None and not flown_by_hand(scenario.pilot):
+    if outputs.mavlink is None and not flown_by_hand(scenario.options.pilot):
         return None
     refuse_unpaced(scenario, paced=live)
     from telemetry.mavlink import MavlinkLink
@@ -225,11 +225,11 @@ def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutput
         scenario_name=scenario.name,
         scenario_toml=scenario.source,
         database_hash=simulation.database_hash,
-        seed=scenario.seed,
-        rate_hz=float(scenario.rate_hz),
+        seed=scenario.options.seed,
+        rate_hz=float(scenario.options.rate_hz),
         versions=versions(),
         setup=replay_setup(scenario),
-        corridor=corridor_outline(scenario.corridor_name, scenario.database),
+        corridor=corridor_outline(scenario.options.corridor_name, scenario.options.database),
     )
     return Recorder(outputs.log, metadata, live=live, overwrite=outputs.overwrite)
 
@@ -263,9 +263,9 @@ def _measure(
 
 def _limit_watch(scenario: Scenario, dt: float) -> Callable[[Callable[[LogEvent], None]], LimitWatch] | None:
     """What watches the flight's limits; nothing with the protection off."""
-    if scenario.protection == "off":
+    if scenario.options.protection == "off":
         return None
-    return functools.partial(LimitWatch, scenario.corridor_name, dt=dt, database=scenario.database)
+    return functools.partial(LimitWatch, scenario.options.corridor_name, dt=dt, database=scenario.options.database)
 
 
 def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | None) -> OutputError | None:

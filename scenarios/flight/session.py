@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rtsim.aids import switch_of
+from rtsim.choices import PilotMode
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults import fault_events
@@ -19,7 +20,7 @@ from rtsim.protection.chain import LawEvent
 from rtsim.units import to_deg
 from scenarios.files.disturbances import disturbance_event
 from scenarios.files.nacelle_laws import NacelleLawFactory, NacelleLawGuard
-from scenarios.files.scenario import PilotMode, ScenarioEvent
+from scenarios.files.scenario import ScenarioEvent
 from scenarios.flight.hands import Hands, pilot_modes
 from scenarios.flight.pilots import PilotFactory
 from telemetry.log.format import LogEvent

@@ -7,13 +7,13 @@ import math
 from dataclasses import dataclass
 
 from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.choices import OuterLoop, PlantName
 from rtsim.frame import SIGNAL_NAMES, FloatArray
-from rtsim.loop.setup import FlightSetup, Plant, build_parts
+from rtsim.loop.setup import FlightSetup, build_parts
 from rtsim.loop.simulation import Simulation
 from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
 from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
 from rtsim.pilot.layout_kernels import PilotTables
-from rtsim.pilot.schedule import OuterLoop
 from rtsim.pilot.weights import PilotSettings
 from rtsim.programme import Programme
 
@@ -29,7 +29,7 @@ class Variant:
     """Short name."""
     title: str
     """For people."""
-    plant: Plant = "lpv"
+    plant: PlantName = "lpv"
     """Aircraft model."""
     outer_loop: OuterLoop = "integrators"
     """How the pilot holds airspeed and altitude."""
@@ -127,13 +127,8 @@ class Flyer:
         air = AirSpecification()
         if variant.turbulence:
             air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=variant.turbulence))
-        setup = FlightSetup(
-            programme=programme,
-            plant=variant.plant,
-            outer_loop=variant.outer_loop,
-            rate_hz=RATE_HZ,
-            air=air,
-            seed=variant.seed,
+        setup = FlightSetup(programme=programme, air=air).with_options(
+            plant=variant.plant, outer_loop=variant.outer_loop, rate_hz=RATE_HZ, seed=variant.seed
         )
         parts = build_parts(setup)
         if self._pilot is not None:

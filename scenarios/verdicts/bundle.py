@@ -12,7 +12,6 @@ from typing import Any
 
 from rtsim.errors import OutputError
 from rtsim.protection import LAW_NAMES
-from scenarios.files.scenario import Scenario
 from scenarios.flight.flight_setup import versions
 from scenarios.flight.runner import FlightOutputs, fly
 from scenarios.verdicts.tester import Case
@@ -56,8 +55,8 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
     if case.off is not None:
         laws.append(("off", "off"))
     for place, law in laws:
-        scenario: Scenario = dataclasses.replace(
-            case.scenario, protection=law, corridor=case.scenario.corridor_name, expectations=()
+        scenario = dataclasses.replace(
+            case.scenario.with_options(protection=law, corridor=case.scenario.options.corridor_name), expectations=()
         )
         path = part / f"{place}.parquet"
         record = fly(scenario, speed="max", outputs=FlightOutputs(log=path))
@@ -72,7 +71,7 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
 
 def _commands(case: Case, logs: dict[str, Any]) -> list[str]:
     law = shlex.quote(case.law)
-    commands = [f"rtsim test scenario.toml --protection {law} --plant {case.scenario.plant}"]
+    commands = [f"rtsim test scenario.toml --protection {law} --plant {case.scenario.options.plant}"]
     return commands + [f"rtsim replay {item['log']}" for item in logs.values()]
 
 

@@ -60,10 +60,10 @@ def _conditions(cases: Sequence[Case]) -> str:
     """What all cases have in common."""
     found = [f"rtsim {rtsim.__version__}"]
     for words, values in (
-        ("aircraft model", {case.scenario.plant for case in cases}),
-        ("corridor", {case.scenario.corridor_name for case in cases}),
+        ("aircraft model", {case.scenario.options.plant for case in cases}),
+        ("corridor", {case.scenario.options.corridor_name for case in cases}),
         ("law under test", {case.law for case in cases}),
-        ("seed", {str(case.scenario.seed) for case in cases}),
+        ("seed", {str(case.scenario.options.seed) for case in cases}),
     ):
         if len(values) == 1:
             found.append(f"{words} {html.escape(values.pop())}")
@@ -104,12 +104,12 @@ def _section(case: Case) -> str:
         f"<td class='remark'>{html.escape(TRIAL_METRICS[name])}</td></tr>"
         for name, value in case.metrics.items()
     )
-    name, scenario = html.escape(case.name), case.scenario
+    name, scenario, options = html.escape(case.name), case.scenario, case.scenario.options
     heading = f"<h2 id='{name}'>{name}: <span class='{case.verdict}'>{case.verdict}</span></h2>"
     about = f"<p>{html.escape(scenario.title)}. {html.escape(scenario.description)}</p>"
     flown = (
-        f"{html.escape(case.kind)}; aircraft model {html.escape(scenario.plant)}, corridor {scenario.corridor_name}, "
-        f"law {html.escape(case.law)}, seed {scenario.seed}."
+        f"{html.escape(case.kind)}; aircraft model {options.plant}, corridor {options.corridor_name}, "
+        f"law {html.escape(case.law)}, seed {options.seed}."
     )
     parts = [heading, about, f"<p class='remark'>{flown}</p>"]
     endings = {"with the law": case.flight.end_reason, "without": "" if case.off is None else case.off.end_reason}

@@ -114,7 +114,7 @@ def _flights(case: Case) -> list[tuple[str, FloatArray, str]]:
 
 
 def _draw_path(axes: Any, case: Case, flights: Sequence[tuple[str, FloatArray, str]]) -> None:
-    name = case.scenario.corridor_name
+    name = case.scenario.options.corridor_name
     corridor = load_boundary(name)
     stop = float(to_deg(corridor.downstop_nacelle))
     angles = np.linspace(corridor.downstop_nacelle, np.pi / 2.0, 181)

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from rtsim.choices import HAND_PILOT
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.loop.options import FlightOptions
 from rtsim.measures.metrics import flight_metrics
 from rtsim.measures.trial_metrics import TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
-from scenarios.campaign.trial import Bench, FlightPlan, TrialFlight
-from scenarios.files.scenario import CorridorName, Expectation, PlantName, Scenario
+from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
+from scenarios.files.scenario import Expectation, Scenario
 from scenarios.files.trial import Trial
+from scenarios.flight.flight_setup import flight_setup
 from scenarios.verdicts.events import new_violations
 
-TEST_CORRIDOR: CorridorName = "flight"
-"""Corridor of scenarios that name none."""
 LAW_CLAUSE = "law"
 """Metric of the clause that the law runs without failing."""
-HAND_PILOT = "mavlink"
-"""Scenarios with this pilot need a person and are no tests."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +117,9 @@ class Case:
             "law": self.law,
             "verdict": self.verdict,
             "error": self.error,
-            "seed": self.scenario.seed,
-            "plant": self.scenario.plant,
-            "corridor_name": self.scenario.corridor_name,
+            "seed": self.scenario.options.seed,
+            "plant": self.scenario.options.plant,
+            "corridor_name": self.scenario.options.corridor_name,
             "failures": [finding.sentence for finding in self.failures],
             "expectations": [
                 {
@@ -145,19 +143,20 @@ class Case:
 class Tester:
     """Flies cases; keeps what is costly to load."""
 
-    def __init__(self, *, law: str | None = None, plant: PlantName | None = None) -> None:
+    def __init__(self, *, law: str | None = None, **options: Any) -> None:
         """Remember what to test.
 
         Args:
             law: Law under test in every scenario; None: each scenario's own.
-            plant: Aircraft model in every scenario; None: each scenario's own.
+            options: Options of every flight instead of each scenario's, by field of ``FlightOptions``, SI.
 
         Raises:
-            InputError: There is no such law.
+            InputError: There is no such law, or an option is out of range.
         """
-        self._law, self._plant = law, plant
+        FlightOptions().changed(options)
+        self._law, self._options = law, options
         self._folder = present_folder()
-        self._benches: dict[tuple[str, str, int], Bench] = {}
+        self._bench = Bench()
         if law is not None:
             law_chain(law, self._folder)
 
@@ -171,9 +170,7 @@ class Tester:
             InputError: It cannot be flown.
         """
         # Tests judge by the flight corridor, with laws and without, unless the scenario names another.
-        scenario = dataclasses.replace(
-            scenario, plant=self._plant or scenario.plant, corridor=scenario.corridor or TEST_CORRIDOR
-        )
+        scenario = _judged(scenario).with_options(**self._options)
         if scenario.trial is None:
             return self._flight_case(scenario)
         return self._trial_case(scenario, scenario.trial)
@@ -182,10 +179,7 @@ class Tester:
         begin = time.perf_counter()
         law = self._law or trial.law
         law_chain(law, self._folder)
-        key = (scenario.plant, scenario.corridor_name, scenario.rate_hz)
-        if key not in self._benches:
-            self._benches[key] = Bench(plant=scenario.plant, corridor=scenario.corridor_name, rate_hz=scenario.rate_hz)
-        bench = self._benches[key]
+        bench = self._bench
         plan = plan_of(scenario)
         off = bench.fly(plan, "off", keep=True)
         flown = fly_law(bench, plan, LawVariant(law), folder=self._folder, repeat=True, keep=True)
@@ -213,8 +207,7 @@ class Tester:
         from scenarios.flight.runner import fly
 
         begin = time.perf_counter()
-        overrides = Overrides(plant=scenario.plant, protection=self._law)
-        record = fly(scenario, speed="max", overrides=overrides)
+        record = fly(scenario, speed="max", overrides=Overrides(protection=self._law))
         asked = {clause.name: clause for clause in scenario.expectations}
         findings = []
         for item in record.verdicts:
@@ -225,7 +218,7 @@ class Tester:
             findings.append(Finding(item.name, metric, item.held, value, words))
         return Case(
             scenario=record.scenario,
-            law=record.scenario.protection,
+            law=record.scenario.options.protection,
             kind="flight",
             findings=tuple(findings),
             metrics={},
@@ -242,20 +235,12 @@ def plan_of(scenario: Scenario) -> FlightPlan:
     Args:
         scenario: The scenario.
     """
-    return FlightPlan(
-        programme=scenario.programme,
-        start=scenario.start,
-        duration=scenario.duration,
-        pulses=scenario.pulses,
-        air=scenario.air,
-        faults=scenario.faults,
-        wind=scenario.wind,
-        pilot_noise=scenario.pilot_noise,
-        outer_loop=scenario.outer_loop,
-        automatic_flaps=scenario.automatic_flaps,
-        governor=scenario.governor,
-        seed=scenario.seed,
-    )
+    return FlightPlan(flight_setup(scenario), scenario.duration)
+
+
+def _judged(scenario: Scenario) -> Scenario:
+    """The scenario in the corridor that tests judge by."""
+    return scenario.with_options(corridor=scenario.options.corridor or TRIAL_CORRIDOR)
 
 
 def is_test(scenario: Scenario) -> bool:
@@ -265,7 +250,7 @@ def is_test(scenario: Scenario) -> bool:
         scenario: The scenario.
     """
     judged = scenario.trial is not None or bool(scenario.expectations)
-    return judged and scenario.pilot != HAND_PILOT
+    return judged and scenario.options.pilot != HAND_PILOT
 
 
 def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
@@ -278,8 +263,8 @@ def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
     """
     trial = scenario.trial
     return Case(
-        scenario=dataclasses.replace(scenario, corridor=scenario.corridor or TEST_CORRIDOR),
-        law=law or (trial.law if trial is not None else scenario.protection),
+        scenario=_judged(scenario),
+        law=law or (trial.law if trial is not None else scenario.options.protection),
         kind=trial.kind if trial is not None else "flight",
         findings=(),
         metrics={},
@@ -351,7 +336,7 @@ def _flight_findings(scenario: Scenario, rows: FloatArray) -> list[Finding]:
     """The scenario's ``[[expect]]`` clauses, of the protected flight."""
     if not scenario.expectations:
         return []
-    metrics = flight_metrics(rows, scenario.programme, 1.0 / scenario.rate_hz)
+    metrics = flight_metrics(rows, scenario.programme, 1.0 / scenario.options.rate_hz)
     found = []
     for clause in scenario.expectations:
         value = metrics.value(clause.metric)

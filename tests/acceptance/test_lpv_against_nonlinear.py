@@ -18,7 +18,7 @@ LIMITS = {"airspeed_kt": 0.3, "altitude_m": 0.5, "pitch_deg": 0.4, "flapping_deg
 
 
 def fly(programme, plant):
-    simulation = Simulation(FlightSetup(programme=programme, plant=plant))
+    simulation = Simulation(FlightSetup(programme=programme).with_options(plant=plant))
     return simulation.run(round(programme.duration * 250))
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rtsim.analysis.frozen_loop import Condition, frozen_loop, stability_map
+from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
 from rtsim.lpv.tables import prepare_tables
 from rtsim.pilot.layout_kernels import pilot_state_size
 from rtsim.pilot.pilot_kernels import mocm_advance, mocm_engage, mocm_output
-from rtsim.pilot.schedule import OUTER_LOOPS, OuterLoop
 from rtsim.pilot.tables import load_pilot_tables
 from rtsim.units import deg, kt
 

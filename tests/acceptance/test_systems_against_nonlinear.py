@@ -22,7 +22,7 @@ LIMITS = {"airspeed_kt": 0.3, "altitude_m": 0.5, "pitch_deg": 0.4, "flapping_deg
 
 def simulation(airspeed, nacelle, plant):
     programme = Programme.hold(airspeed=kt(airspeed), nacelle_angle=deg(nacelle), altitude=100.0)
-    return Simulation(FlightSetup(programme=programme, plant=plant))
+    return Simulation(FlightSetup(programme=programme).with_options(plant=plant))
 
 
 def with_flaps(airspeed, nacelle, setting, plant):

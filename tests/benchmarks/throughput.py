@@ -67,7 +67,8 @@ def closed_loop_rows() -> list[Row]:
     programme = load_scenario("typical_conversion").programme
     frames = round(programme.duration * CLOSED_LOOP_HZ)
     simulations = {
-        plant: Simulation(FlightSetup(programme=programme, plant=plant)) for plant in ("lpv", "lpv-plain", "nonlinear")
+        plant: Simulation(FlightSetup(programme=programme).with_options(plant=plant))
+        for plant in ("lpv", "lpv-plain", "nonlinear")
     }
     for simulation in simulations.values():
         simulation.warm_up()

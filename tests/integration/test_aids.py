@@ -26,10 +26,10 @@ STABILITY = ("rate_damping", "attitude_retention", "trim_bias")
 HOLDS = (*STABILITY, "altitude_hold", "airspeed_hold")
 
 
-def setup(airspeed_kt: float, nacelle_deg: float, **changes: object) -> FlightSetup:
+def setup(airspeed_kt: float, nacelle_deg: float, altitude: float = 100.0, **options: object) -> FlightSetup:
     """A flight in other hands than the MOCM's, from a trim."""
-    programme = Programme.hold(airspeed=kt(airspeed_kt), nacelle_angle=deg(nacelle_deg), altitude=100.0)
-    return FlightSetup(programme=programme, pilot="external", **changes)  # type: ignore[arg-type]
+    programme = Programme.hold(airspeed=kt(airspeed_kt), nacelle_angle=deg(nacelle_deg), altitude=altitude)
+    return FlightSetup(programme=programme).with_options(pilot="external", **options)
 
 
 @pytest.mark.parametrize(("airspeed", "nacelle"), CONDITIONS)
@@ -110,7 +110,7 @@ def test_the_mocm_flies_the_bare_aircraft() -> None:
     """Aids switched on change nothing while the MOCM flies."""
     programme = Programme.hold(airspeed=kt(60.0), nacelle_angle=deg(80.0), altitude=100.0)
     bare = Simulation(FlightSetup(programme=programme)).run(500)
-    aided = Simulation(FlightSetup(programme=programme, aids=HOLDS)).run(500)
+    aided = Simulation(FlightSetup(programme=programme).with_options(aids=HOLDS)).run(500)
     np.testing.assert_array_equal(bare, aided)
 
 
@@ -142,7 +142,7 @@ def test_the_nose_stays_where_it_is_while_the_flaps_come_in(plant: str) -> None:
     The flaps' moment alone is 0.7 rad/s^2: without the bias's answer to it the nose fell by thirty degrees on the LPV
     aircraft. Now four are measured; six are what may not be passed.
     """
-    simulation = Simulation(setup(165, 0, aids=STABILITY, plant=plant, start_altitude=1000.0))
+    simulation = Simulation(setup(165, 0, aids=STABILITY, plant=plant, altitude=1000.0))
     lever, pitch = float(simulation._state.u[1]), np.degrees(float(simulation._state.x[STATE.pitch]))
     rows = fly_hold(simulation, 30.0, lambda _: Command(0.0, lever + 0.05, 0.0))
     assert rows[-1, COLUMN.flap_deg] == 0.0
@@ -155,7 +155,7 @@ def test_flaps_by_hand_do_not_pitch_the_aircraft(plant: str) -> None:
     """One setting in at 150 kn, hands off: the nose moves by 3 deg at most; more where the bias ignores the flaps."""
     moved = {}
     for answered in (True, False):
-        simulation = Simulation(setup(150, 0, aids=STABILITY, plant=plant, start_altitude=1000.0))
+        simulation = Simulation(setup(150, 0, aids=STABILITY, plant=plant, altitude=1000.0))
         if not answered:
             maps = simulation.tables.aids.maps.copy()
             maps[MAP_STICK_FLAPS:] = 0.0

@@ -22,7 +22,8 @@ MODERATE = AirSpecification(
 
 def hold(airspeed, nacelle, *, altitude=100.0, **changes):
     programme = Programme.hold(airspeed=kt(airspeed), nacelle_angle=deg(nacelle), altitude=altitude)
-    return FlightSetup(programme=programme, **changes)
+    air = changes.pop("air", AirSpecification())
+    return FlightSetup(programme=programme, air=air).with_options(**changes)
 
 
 def flown(simulation, frames):

@@ -96,9 +96,8 @@ def test_steps_runs_batches_and_snapshots_agree(automatic_flight):
 
 
 def test_the_law_sets_the_nacelles_whoever_flies():
-    setup = FlightSetup(
-        programme=accelerating(90, 110, 2.0, 75.0), pilot="external", automatic_nacelle=AutomaticNacelle()
-    )
+    programme = accelerating(90, 110, 2.0, 75.0)
+    setup = FlightSetup(programme=programme, automatic_nacelle=AutomaticNacelle()).with_options(pilot="external")
     simulation = Simulation(setup)
     for _ in range(500):
         row = simulation.step(dataclasses.replace(simulation.pilot_command(), nacelle_rate=deg(7.0)))

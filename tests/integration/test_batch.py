@@ -26,12 +26,15 @@ from rtsim.programme import Programme
 from rtsim.units import deg, kt
 
 PROGRAMMES = [paper_path(name, nacelle_rate_deg_s=8.0).programme() for name in PATH_NAMES]
-ROUGH = {"pilot_noise": True, "air": AirSpecification(turbulence=Turbulence.of_severity("moderate"))}
+CALM = FlightSetup(programme=PROGRAMMES[0])
+ROUGH = FlightSetup(
+    programme=PROGRAMMES[0], air=AirSpecification(turbulence=Turbulence.of_severity("moderate"))
+).with_options(pilot_noise=True)
 
 
-@pytest.fixture(scope="module", params=[{}, ROUGH], ids=["calm", "turbulence and noise"])
+@pytest.fixture(scope="module", params=[CALM, ROUGH], ids=["calm", "turbulence and noise"])
 def setup(request):
-    return FlightSetup(programme=PROGRAMMES[0], seed=3, **request.param)
+    return request.param.with_options(seed=3)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +81,7 @@ def test_the_number_of_workers_changes_nothing(setup, flown):
 
 
 def test_seeds_belong_to_flights():
-    flyer = BatchFlyer(FlightSetup(programme=PROGRAMMES[0], **ROUGH), workers=2)
+    flyer = BatchFlyer(ROUGH, workers=2)
     flights = [BatchFlight(PROGRAMMES[0], seed, duration=5.0) for seed in (1, 2, 1)]
     first, second, again = flyer.fly(flights)
     assert first == again
@@ -111,9 +114,10 @@ def test_a_flight_that_ends_by_itself_is_not_completed():
     # Descending through the ground at cruise speed.
     programme = Programme(np.array([0.0, 20.0]), np.full(2, kt(170.0)), np.zeros(2), np.array([30.0, 0.0]))
     programme = Programme(programme.time, programme.airspeed, programme.nacelle_angle, np.array([5.0, 0.0]))
-    flyer = BatchFlyer(FlightSetup(programme=programme, start_altitude=0.05), workers=1)
+    low = FlightSetup(programme=programme, start=dataclasses.replace(programme.at(0.0), altitude=0.05))
+    flyer = BatchFlyer(low, workers=1)
     figures = flyer.fly_one(BatchFlight(programme, duration=60.0))
-    single = Simulation(FlightSetup(programme=programme, start_altitude=0.05))
+    single = Simulation(low)
     rows = single.run(15_000)
     assert figures.frames == len(rows)
     assert figures.completed is not single.finished

@@ -18,7 +18,8 @@ PLANTS = ["lpv", "nonlinear"]
 
 def hold(airspeed, nacelle, **changes):
     programme = Programme.hold(airspeed=kt(airspeed), nacelle_angle=deg(nacelle), altitude=100.0)
-    return FlightSetup(programme=programme, **changes)
+    faults = changes.pop("faults", ())
+    return FlightSetup(programme=programme, faults=faults).with_options(**changes)
 
 
 def conversion(**changes):
@@ -26,7 +27,8 @@ def conversion(**changes):
     programme = Programme(
         np.array([0.0, 8.0]), kt(np.array([60.0, 80.0])), deg(np.array([82.5, 75.0])), np.full(2, 100.0)
     )
-    return FlightSetup(programme=programme, **changes)
+    faults = changes.pop("faults", ())
+    return FlightSetup(programme=programme, faults=faults).with_options(**changes)
 
 
 @pytest.mark.parametrize("plant", PLANTS)

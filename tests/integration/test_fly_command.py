@@ -18,11 +18,13 @@ import pytest
 from rtsim.cli.fly import parse_speed
 from rtsim.cli.main import run
 from rtsim.errors import InputError
+from rtsim.loop.options import FlightOptions
 from scenarios.flight.replay import replay_log
 from telemetry.log.reader import read_log
 
 KEYS = {
     "scenario": None, "pilot": None, "plant": None, "protection": None, "corridor_name": None, "rate_hz": None,
+    "seed": None, "options": set(FlightOptions().shown()),
     "duration_s": None, "wall_s": None, "real_time_factor": None, "frames": None, "completed": None,
     "end_reason": None, "overruns": None, "lateness_us": {"p50", "p99", "max"}, "drift_frames": None,
     "work_us": {"p50", "p99"}, "work_cpu_us": {"p50", "p99"}, "history_sha256": None,

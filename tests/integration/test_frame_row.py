@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,14 +21,15 @@ ROUNDING = 1e-9
 """Columns are converted to their units and back."""
 
 
-def conversion(**changes: object) -> FlightSetup:
+def conversion(**changes: Any) -> FlightSetup:
     programme = Programme(
         np.array([0.0, 8.0, 10.0]),
         kt(np.array([60.0, 84.0, 84.0])),
         deg(np.array([85.0, 70.0, 70.0])),
         np.full(3, 100.0),
     )
-    return FlightSetup(programme=programme, **changes)  # type: ignore[arg-type]
+    air = changes.pop("air", AirSpecification())
+    return FlightSetup(programme=programme, air=air).with_options(**changes)
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +124,7 @@ def touch(
 ) -> str:
     """Why the flight ends where the aircraft is put just above the ground in that motion."""
     snapshot = simulation.snapshot()
-    pitch, along = deg(pitch_deg), kt(ground_speed_kt) - simulation.setup.wind
+    pitch, along = deg(pitch_deg), kt(ground_speed_kt) - simulation.setup.options.wind
     state = dataclasses.replace(snapshot, state=type(snapshot.state)(*(array.copy() for array in snapshot.state)))
     x, nacelle = state.state.x, state.state.nacelle
     x[STATE.altitude], x[STATE.pitch], x[STATE.q] = altitude, pitch, 0.0

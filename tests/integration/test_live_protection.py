@@ -80,7 +80,7 @@ def test_limits_and_interventions_are_told_alike_at_any_speed() -> None:
 
 def test_least_margins_are_those_of_the_monitor() -> None:
     flight = scenarios.fly("ep11_jam_60_accelerating", speed="max", overrides=Overrides(duration=30.0))
-    expected = MarginMonitor(flight.scenario.corridor_name).history(flight.rows).summary()
+    expected = MarginMonitor(flight.scenario.options.corridor_name).history(flight.rows).summary()
     limits = flight.summary()["limits"]
     assert {
         "stall_attitude",

@@ -120,7 +120,7 @@ def test_the_winner_flies_again_with_the_same_figures_to_the_last_bit(problem, f
     assert record.completed
     assert record.metrics is not None
     assert record.metrics.flapping_deg.integral_deg_s == found.objectives[0]
-    assert figures_of_rows(record.rows, 1.0 / scenario.rate_hz) == problem.fly([path])[0][0]
+    assert figures_of_rows(record.rows, 1.0 / scenario.options.rate_hz) == problem.fly([path])[0][0]
     assert all(verdict.held for verdict in record.verdicts)
     # The same flight by hand.
     simulation = Simulation(dataclasses.replace(problem.setup, programme=path.programme()))
@@ -217,7 +217,7 @@ def test_the_robust_variant_judges_by_flights_in_turbulence():
         robust={"flights": 3, "spread_weight": 1.0},
         search={"generations": 1, "population": 4, "start_from": ["typical"]},
     )
-    assert robust.setup.pilot_noise
+    assert robust.setup.options.pilot_noise
     assert robust.seeds == (1000, 1001, 1002)
     path = paper_path("typical")
     flights = robust.fly([path])[0]

@@ -11,10 +11,14 @@ import pytest
 import scenarios
 from rtsim.cli.main import run
 from rtsim.lpv.files.storage import load_database, save_database
+from scenarios.campaign.chunks import Chunk, fly_chunk
+from scenarios.campaign.run import CampaignOptions, identity, make_task
+from scenarios.campaign.spec import load_campaign
 from scenarios.files.loader import load_scenario
 from scenarios.files.options import Overrides
 from scenarios.flight.replay import replay_log
 from scenarios.flight.runner import FlightOutputs
+from scenarios.verdicts import tester
 
 
 @pytest.fixture(scope="module")
@@ -52,10 +56,31 @@ def test_another_aircraft_flies_another_flight_and_replays(files: Path, tmp_path
     assert replay_log(log).same
 
 
+def test_a_trial_flies_the_database_it_is_given(files: Path) -> None:
+    scenario = load_scenario("ep04_wrong_nacelle_command")
+    hashes = [
+        tester.Tester(law="full", **changes).run(scenario).flight.history_sha256
+        for changes in ({}, {"database": str(files / "same.nc")}, {"database": str(files / "weak.nc")})
+    ]
+    assert hashes[0] == hashes[1]
+    assert hashes[0] != hashes[2]
+
+
+def test_a_campaign_flies_the_database_it_is_given(files: Path) -> None:
+    spec, text = load_campaign("misuse")
+    flown = []
+    for changes in ({}, {"database": str(files / "same.nc")}, {"database": str(files / "weak.nc")}):
+        task = make_task(spec, text, options=CampaignOptions(changes=changes), file="misuse")
+        flown.append((identity(task)["database"], fly_chunk(task, Chunk(0, 0, 1)).metrics))
+    assert flown[0][0] == flown[1][0] != flown[2][0]
+    np.testing.assert_array_equal(flown[0][1], flown[1][1])
+    assert (flown[0][1] != flown[2][1]).any()
+
+
 def test_a_scenario_names_its_database_beside_it(files: Path) -> None:
     text = 'format = 1\nname = "own"\ntitle = "Own"\nduration_s = 1\n[flight]\ndatabase = "weak.nc"\n'
     (files / "own.toml").write_text(text + '[start]\ncondition = "hover"\n', encoding="utf-8")
-    assert load_scenario(files / "own.toml").database == str((files / "weak.nc").resolve())
+    assert load_scenario(files / "own.toml").options.database == str((files / "weak.nc").resolve())
     assert scenarios.fly(files / "own.toml", speed="max").completed
 
 

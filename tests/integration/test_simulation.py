@@ -12,7 +12,7 @@ from rtsim.errors import InputError
 from rtsim.frame import COLUMN, history_sha256
 from rtsim.loop.data import SimulationState
 from rtsim.loop.simulation import FlightSetup, Simulation
-from rtsim.programme import Programme
+from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
 
 
@@ -24,7 +24,7 @@ def short_conversion(**changes: object) -> FlightSetup:
         deg(np.array([90.0, 82.0, 82.0])),
         np.full(3, 100.0),
     )
-    return FlightSetup(programme=programme, **changes)  # type: ignore[arg-type]
+    return FlightSetup(programme=programme).with_options(**changes)
 
 
 def flown(simulation: Simulation, frames: int) -> np.ndarray:
@@ -150,7 +150,7 @@ def test_a_command_that_is_no_number_is_refused() -> None:
 
 def test_start_outside_the_trims_is_refused() -> None:
     """A start that cannot be trimmed is an input error, not a wild flight."""
-    setup = short_conversion(start_airspeed=kt(30.0), start_nacelle=deg(0.0))
+    setup = dataclasses.replace(short_conversion(), start=ProgrammePoint(kt(30.0), 0.0, 100.0))
     with pytest.raises(InputError, match="trim"):
         Simulation(setup)
 
@@ -158,7 +158,7 @@ def test_start_outside_the_trims_is_refused() -> None:
 def test_setup_is_frozen() -> None:
     """A flight's setup cannot change under it."""
     with pytest.raises(dataclasses.FrozenInstanceError):
-        short_conversion().seed = 3  # type: ignore[misc]
+        short_conversion().options.seed = 3  # type: ignore[misc]
 
 
 @pytest.mark.parametrize("outer_loop", ["integrators", "pi"])
@@ -172,7 +172,7 @@ def test_a_climbing_programme_is_followed(airspeed: float, nacelle: float, outer
         np.full(4, deg(nacelle)),
         np.array([100.0, 100.0, 140.0, 140.0]),
     )
-    rows = Simulation(FlightSetup(programme=programme, outer_loop=outer_loop)).run(40 * 250)  # type: ignore[arg-type]
+    rows = Simulation(FlightSetup(programme=programme).with_options(outer_loop=outer_loop)).run(40 * 250)
     error = rows[:, COLUMN.altitude_m] - rows[:, COLUMN.altitude_reference_m]
     assert np.abs(error).max() < 6.0
     assert rows[-1, COLUMN.altitude_m] == pytest.approx(140.0, abs=2.5)  # as conversions must hold it

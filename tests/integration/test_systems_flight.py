@@ -37,7 +37,8 @@ PLANTS = ["lpv", "lpv-plain", "nonlinear"]
 
 def hold(airspeed: float, nacelle: float, altitude: float = 100.0, **changes: Any) -> FlightSetup:
     programme = Programme.hold(airspeed=kt(airspeed), nacelle_angle=deg(nacelle), altitude=altitude)
-    return FlightSetup(programme=programme, **changes)
+    faults = changes.pop("faults", ())
+    return FlightSetup(programme=programme, faults=faults).with_options(**changes)
 
 
 @pytest.mark.parametrize("plant", PLANTS)
@@ -84,7 +85,7 @@ def test_flaps_left_to_themselves_stay_out_where_the_schedule_takes_them_in() ->
     programme = Programme(np.array([0.0, 14.0]), kt(np.array([165.0, 200.0])), np.zeros(2), np.full(2, 500.0))
     flaps = {}
     for automatic in (True, False):
-        rows = Simulation(FlightSetup(programme=programme, automatic_flaps=automatic)).run(18 * 250)
+        rows = Simulation(FlightSetup(programme=programme).with_options(automatic_flaps=automatic)).run(18 * 250)
         flaps[automatic] = rows[:, COLUMN.flap_deg]
         assert rows[-1, COLUMN.airspeed_kt] > 195.0
     assert flaps[True][-1] == 0.0
@@ -198,7 +199,7 @@ def test_a_scenario_starts_without_them(tmp_path: Path) -> None:
     )
     (tmp_path / "own.toml").write_text(text + '[start]\ncondition = "hover"\n', encoding="utf-8")
     scenario = load_scenario(tmp_path / "own.toml")
-    assert (scenario.automatic_flaps, scenario.governor) == (False, False)
+    assert (scenario.options.automatic_flaps, scenario.options.governor) == (False, False)
     assert scenarios.fly(tmp_path / "own.toml", speed="max").completed
 
 

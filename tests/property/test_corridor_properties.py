@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtsim.corridor import CORRIDOR_NAMES, load_corridor
+from rtsim.choices import CHART_NAMES
+from rtsim.corridor import load_corridor
 from rtsim.corridor.corridor_kernels import corridor_level_step, corridor_margins, new_level_state
 from rtsim.units import deg, kt
 
 TRAVEL = deg(95.0)
-corridors = st.sampled_from([load_corridor(name) for name in CORRIDOR_NAMES])
+corridors = st.sampled_from([load_corridor(name) for name in CHART_NAMES])
 airspeeds = st.floats(-60.0, 300.0).map(kt)
 angles = st.floats(0.0, 95.0).map(deg)
 

@@ -71,7 +71,7 @@ def _trials() -> Iterator[tuple[str, Any]]:
         spec, problems = parse_campaign(file.read_text(encoding="utf-8"), file=file.name)
         if spec is None:
             raise problems[0]
-        bench = Bench(plant="lpv", corridor=spec.corridor)
+        bench = Bench()
         for number in range(CAMPAIGN_RUNS):
             place, run = number % len(spec.classes), number // len(spec.classes)
             plan = draw_plan(spec, seed=0, class_number=place, run=run)

@@ -174,10 +174,10 @@ def parsed(nacelle, table=""):
 
 
 def test_scenarios_choose_the_law():
-    assert parsed('"programme"').nacelle == "programme"
-    assert parsed('"my_laws:Mine"').nacelle == "my_laws:Mine"
+    assert parsed('"programme"').options.nacelle == "programme"
+    assert parsed('"my_laws:Mine"').options.nacelle == "my_laws:Mine"
     scenario = parsed('"automatic"', '[automatic]\nschedule = "programme"\nrate_deg_s = 12\ndetents = true')
-    law = automatic_nacelle(scenario.nacelle, scenario.automatic, scenario.programme)
+    law = automatic_nacelle(scenario.options.nacelle, scenario.automatic, scenario.programme)
     assert law is not None
     assert law.rate == deg(12.0)
     assert law.detents
@@ -187,11 +187,11 @@ def test_scenarios_choose_the_law():
         '[automatic]\nschedule = "points"\npoints = [{ airspeed_kt = 50, nacelle_deg = 90 },'
         " { airspeed_kt = 120, nacelle_deg = 0 }]",
     )
-    law = automatic_nacelle(own.nacelle, own.automatic, own.programme)
+    law = automatic_nacelle(own.options.nacelle, own.automatic, own.programme)
     assert law is not None
     assert to_deg(law.schedule.at(kt(85.0))) == pytest.approx(45.0)
     plain = parsed('"automatic"')
-    assert automatic_nacelle(plain.nacelle, plain.automatic, plain.programme) == AutomaticNacelle()
+    assert automatic_nacelle(plain.options.nacelle, plain.automatic, plain.programme) == AutomaticNacelle()
     assert automatic_nacelle("programme", plain.automatic, plain.programme) is None
 
 
@@ -300,4 +300,4 @@ def test_laws_of_installed_packages_are_found_by_name(monkeypatch):
     factory = load_nacelle_law("table")
     assert factory is not None
     assert isinstance(factory(), Table1Nacelle)
-    assert parsed('"table"').nacelle == "table"
+    assert parsed('"table"').options.nacelle == "table"

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from rtsim.corridor import CORRIDOR_NAMES, Boundary, load_corridor
+from rtsim.choices import CHART_NAMES
+from rtsim.corridor import Boundary, load_corridor
 from rtsim.corridor.corridor_kernels import corridor_level_step, new_level_state
 from rtsim.errors import InputError
 from rtsim.units import deg, kt, to_deg, to_kt
@@ -28,7 +29,7 @@ def test_low_side_goes_through_the_published_points(name, points):
         assert to_kt(corridor.low_speed(deg(nacelle_deg))) == pytest.approx(speed_kt, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", CORRIDOR_NAMES)
+@pytest.mark.parametrize("name", CHART_NAMES)
 def test_high_side_is_the_design_speed_and_260_kt_on_the_downstop(name):
     corridor = load_corridor(name)
     for nacelle_deg, speed_kt in V_C.items():
@@ -37,7 +38,7 @@ def test_high_side_is_the_design_speed_and_260_kt_on_the_downstop(name):
     assert to_kt(corridor.high_speed(deg(0.5001))) == pytest.approx(170.0)
 
 
-@pytest.mark.parametrize("name", CORRIDOR_NAMES)
+@pytest.mark.parametrize("name", CHART_NAMES)
 def test_rearward_allowance_near_helicopter_mode(name):
     corridor = load_corridor(name)
     assert to_kt(corridor.low_speed(deg(80.0))) == pytest.approx(-25.0)

@@ -15,6 +15,7 @@ LAYERS = (
     ("rtsim.errors",),
     ("rtsim.frame",),
     ("rtsim.command",),
+    ("rtsim.choices",),
     ("rtsim.random_streams", "rtsim.plugins"),
     ("rtsim.kernels",),
     ("rtsim.aircraft", "rtsim.corridor", "rtsim.programme", "rtsim.atmosphere", "telemetry"),

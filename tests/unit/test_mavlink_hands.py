@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rtsim.aids import AIDS, SWITCHES
+from rtsim.choices import AidName
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
@@ -18,7 +19,6 @@ from rtsim.realtime import Executive, FlightControl
 from rtsim.units import to_deg
 from scenarios.files.loader import load_scenario
 from scenarios.files.options import Overrides, with_overrides
-from scenarios.files.scenario import AidName
 from scenarios.flight.flight_setup import flight_setup
 from scenarios.flight.hands import Hands
 from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
@@ -14,7 +15,7 @@ from rtsim.lpv.tables import prepare_tables
 from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.layout_kernels import OFFSETS, S_ESTIMATE, S_LIMITED, noise_width, pilot_state_size
 from rtsim.pilot.pilot_kernels import PilotTables, mocm_advance, mocm_engage, mocm_output
-from rtsim.pilot.schedule import OUTER_LOOPS, OuterLoop, ScheduledPilot
+from rtsim.pilot.schedule import ScheduledPilot
 from rtsim.pilot.tables import load_pilot_tables
 from rtsim.units import deg, kt
 

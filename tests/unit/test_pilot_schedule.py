@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.errors import InputError
 from rtsim.lpv.database import GRIDDED, Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.pilot.design import design_problem
 from rtsim.pilot.design_plant import CONTROLS, GUSTS, design_plant, plant_layout
 from rtsim.pilot.response import frequency_response
-from rtsim.pilot.schedule import OUTER_LOOPS, OuterLoop, ScheduledPilot, design_schedule, point_problem
+from rtsim.pilot.schedule import ScheduledPilot, design_schedule, point_problem
 from rtsim.pilot.tables import load_pilot_tables, pack_pilot
 from rtsim.pilot.weights import PilotSettings
 from rtsim.units import deg, kt

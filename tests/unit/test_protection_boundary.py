@@ -7,10 +7,11 @@ import pytest
 
 from rtsim.aircraft import OUTPUT, STATE, Condition
 from rtsim.aircraft.xv15.model import Xv15
+from rtsim.choices import CORRIDOR_NAMES
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection import BOUNDARY_NAMES, check_consistency, load_boundary
+from rtsim.protection import check_consistency, load_boundary
 from rtsim.protection.boundary import MODEL_PITCH, guarded_corridor, model_corridor, trim_range
 from rtsim.protection.limits import load_limits
 from rtsim.units import deg, kt, to_deg, to_kt
@@ -27,7 +28,7 @@ def computed(database):
 
 
 def test_every_named_boundary_loads_and_an_unknown_one_is_refused(database):
-    assert [load_boundary(name, database).name for name in BOUNDARY_NAMES] == ["design", "flight", "model"]
+    assert [load_boundary(name, database).name for name in CORRIDOR_NAMES] == ["design", "flight", "model"]
     with pytest.raises(InputError, match="design, flight, model"):
         load_boundary("chart", database)
 

@@ -56,7 +56,7 @@ def test_a_good_file_arrives_in_si() -> None:
     )
     assert [(event.time, event.pilot) for event in scenario.events] == [(5.0, "hold")]
     assert scenario.expectations == (Expectation("airspeed", "airspeed_kt.rms_error", None, 1.0),)
-    assert scenario.corridor_name == "design"
+    assert scenario.options.corridor_name == "design"
     assert scenario.source == GOOD
 
 
@@ -86,7 +86,7 @@ def test_a_good_file_arrives_in_si() -> None:
         ("nacelle_rate_deg_s = 2.5", "nacelle_rate_deg_s = 13", ["nacelle_rate_deg_s", "got 13", "0.1 to 12"]),
         ("[programme]", "[programme", ["is not valid TOML", "line 11", "correct this line"]),
         ("[programme]", "[programme]\npoints = []", ["is not valid TOML", "line"]),
-        ('pilot = "hold"', 'pilot = "sleep"', ["events[0].pilot", "'sleep'", "mocm, hold, external"]),
+        ('pilot = "hold"', 'pilot = "sleep"', ["events[0].pilot", "'sleep'", "mocm, external, hold"]),
         ('action = "pilot"', "", ["events[0].action: is missing"]),
         ("airspeed_kt.rms_error", "airspeed.rms_error", ["expect[0].metric", "'airspeed_kt.rms_error' is meant"]),
         ("max = 1.0", "", ["expect[0]: has no limit", "add min, max or both"]),

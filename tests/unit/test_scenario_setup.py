@@ -44,7 +44,8 @@ def assert_same(one: FlightSetup, two: FlightSetup) -> None:
 def test_setups_read_back_exactly(name: str, plant: str, corridor: str, wind: float, seed: int, noise: bool) -> None:
     overrides = Overrides(plant=plant, corridor=corridor, wind=wind, seed=seed, pilot_noise=noise)  # type: ignore[arg-type]
     setup = flight_setup(with_overrides(load_scenario(name), overrides))
-    assert (setup.plant, setup.corridor, setup.wind, setup.seed, setup.pilot_noise) == (
+    options = setup.options
+    assert (options.plant, options.corridor, options.wind, options.seed, options.pilot_noise) == (
         plant, corridor, wind, seed, noise,
     )  # fmt: skip
     assert_same(through_json(setup), setup)

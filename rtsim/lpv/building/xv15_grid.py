@@ -8,12 +8,12 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib import metadata
-from pathlib import Path
+from importlib.resources import files
 
 import numpy as np
 
 import rtsim
-import rtsim.aircraft
+import rtsim.aircraft.xv15
 from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Condition, LinearModel, TrimPoint, Variable
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
@@ -35,6 +35,8 @@ NEIGHBOUR_PITCH, NEIGHBOUR_STICK, NEIGHBOUR_COLLECTIVE = 8.0 * DEGREE, 0.35, 8.0
 CORNER_AIRSPEED, CORNER_NACELLE = 0.1, 1e-3
 """Reach of the finite differences around the corners of the flap schedule [m/s, rad]."""
 
+MODEL_FILES = ("model_choices.toml", "xv15_inputs.toml")
+"""Data of the nonlinear model, in the order in which they are hashed."""
 SAMPLE = 29
 """One trim in so many is checked by ``still_trims``."""
 STILL_TRIM = 2e-6
@@ -186,9 +188,9 @@ def source_sha256() -> str:
         SHA-256 as 64 hexadecimal digits.
     """
     digest = hashlib.sha256()
-    for path in sorted(Path(rtsim.aircraft.__file__).parent.glob("data/*.toml")):
-        digest.update(path.name.encode())
-        digest.update(repr(tomllib.loads(path.read_text(encoding="utf-8"))).encode())
+    for name in MODEL_FILES:
+        digest.update(name.encode())
+        digest.update(repr(tomllib.loads((files(rtsim.aircraft.xv15) / "data" / name).read_text("utf-8"))).encode())
     return digest.hexdigest()
 
 

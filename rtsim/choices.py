@@ -1,0 +1,30 @@
+"""The words a user chooses from, each list written once; importing them loads no compiled code."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+PlantName = Literal["lpv", "lpv-plain", "nonlinear"]
+"""The layered LPV model (three scheduling variables), the paper's plain one, or the nonlinear model."""
+OuterLoop = Literal["integrators", "pi"]
+"""How the MOCM holds airspeed and altitude: integrators in its design, or the paper's PI loops."""
+ChartName = Literal["design", "flight"]
+"""Corridors of published charts: TM X-62407, and the stall line flown (TM 81244)."""
+CorridorName = Literal[ChartName, "model"]
+"""The charts, and the boundaries that follow from a database's own trims."""
+PilotMode = Literal["mocm", "external", "hold"]
+"""Who holds the sticks: the virtual pilot, somebody else (a person, a plug-in, a recording), or nobody."""
+AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
+"""What acts between the pilot's hands and the control mixing."""
+SwitchName = Literal[AidName, "automatic_flaps", "governor"]
+"""All that can be switched in flight: the aids, and what moves flaps and rotors whoever flies."""
+
+OUTER_LOOPS: tuple[OuterLoop, ...] = get_args(OuterLoop)
+CHART_NAMES: tuple[ChartName, ...] = get_args(ChartName)
+CORRIDOR_NAMES: tuple[CorridorName, ...] = get_args(CorridorName)
+BUILT_IN_PILOT = "mocm"
+"""The virtual pilot, which needs no plug-in."""
+HAND_PILOT = "mavlink"
+"""A person behind MAVLink; the built-in pilot holds the start until the first sticks arrive."""
+PASSIVE_LAWS = frozenset({"off", "monitor"})
+"""Protection that changes no command."""
