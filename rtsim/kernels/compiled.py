@@ -7,13 +7,15 @@ one machine type.
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.extending import typeof_impl
 
 from rtsim.kernels import place_type as place_type  # noqa: PLC0414 - teaches numba the places
 from rtsim.kernels.cache import cache_folder
@@ -34,13 +36,63 @@ except (ImportError, AttributeError):  # a numba that has moved its inside
 """Whether kernels compile lean (``rtsim.kernels.lowering``), or by numba as it is."""
 
 
+class Kernel:
+    """A function that is compiled when it is first called, from Python or from another kernel that is compiled.
+
+    Nothing of the compiler is made before that: a flight uses a tenth of the kernels that its modules hold.
+    """
+
+    def __init__(self, function: Callable[..., Any], *, lowered: bool = False, **options: Any) -> None:
+        """Remember how to compile.
+
+        Args:
+            function: The function.
+            lowered: Only lower it for its callers, where that can be done.
+            options: Options of ``numba.njit``.
+        """
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        """The function as plain Python."""
+        self._lowered, self._options = lowered, options
+        self._dispatcher: Any = None
+
+    @property
+    def dispatcher(self) -> Any:
+        """What numba compiles and calls it by."""
+        if self._dispatcher is None:
+            if numba.config.DISABLE_JIT:
+                self._dispatcher = self.py_func
+            elif LEAN:
+                kind = LoweredDispatcher if self._lowered else WholeDispatcher
+                self._dispatcher = kind(self.py_func, **self._options)
+            else:
+                self._dispatcher = numba.njit(cache=True, **self._options)(self.py_func)
+        return self._dispatcher
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Compile for the types of the arguments, if need be, and call.
+
+        Args:
+            arguments: Its arguments.
+        """
+        return self.dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:  # what numba asks of a dispatcher
+        return getattr(self.dispatcher, name)
+
+
+@typeof_impl.register(Kernel)
+def _type_of_kernel(value: Kernel, _context: Any) -> Any:
+    return value.dispatcher._numba_type_
+
+
 def kernel(function: Function) -> Function:
     """Compile a kernel with all that it calls: cached on disk, numpy's division semantics, strict floating point.
 
     Args:
         function: A function of numbers, arrays, named tuples and packed tuples of them.
     """
-    return _whole(function, error_model="numpy")
+    return _kernel(function, error_model="numpy")
 
 
 def inner_kernel(function: Function) -> Function:
@@ -54,10 +106,7 @@ def inner_kernel(function: Function) -> Function:
         function: A function of numbers, arrays, named tuples and packed tuples of them, returning numbers or nothing
             (or, if called from other inner kernels only, views).
     """
-    if LEAN and not numba.config.DISABLE_JIT:
-        lowered: Function = LoweredDispatcher(function, error_model="numpy", _nrt=False)  # type: ignore[assignment]
-        return lowered
-    return _whole(function, error_model="numpy", _nrt=False)
+    return _kernel(function, lowered=True, error_model="numpy", _nrt=False)
 
 
 def allocating_kernel(function: Function) -> Function:
@@ -66,10 +115,7 @@ def allocating_kernel(function: Function) -> Function:
     Args:
         function: As for ``inner_kernel``.
     """
-    if LEAN and not numba.config.DISABLE_JIT:
-        lowered: Function = LoweredDispatcher(function, error_model="numpy")  # type: ignore[assignment]
-        return lowered
-    return _whole(function, error_model="numpy")
+    return _kernel(function, lowered=True, error_model="numpy")
 
 
 def part(function: Function) -> Function:
@@ -78,7 +124,7 @@ def part(function: Function) -> Function:
     Args:
         function: As for ``inner_kernel``; called at its address, it returns a float.
     """
-    return _whole(function, error_model="numpy", _nrt=False)
+    return _kernel(function, error_model="numpy", _nrt=False)
 
 
 def batch_kernel(function: Function) -> Function:
@@ -87,7 +133,7 @@ def batch_kernel(function: Function) -> Function:
     Args:
         function: A function of numbers, arrays and packed tuples; its work space must be its thread's own.
     """
-    return _whole(function, error_model="numpy", nogil=True)
+    return _kernel(function, error_model="numpy", nogil=True)
 
 
 def interpreted(function: Function) -> Function:
@@ -96,21 +142,13 @@ def interpreted(function: Function) -> Function:
     Args:
         function: The kernel.
     """
-    plain: Any = getattr(function, "py_func", None)
-    if plain is None:  # numba is switched off
-        return function
+    plain: Any = function.py_func
     names = dict(plain.__globals__)
     for name in plain.__code__.co_names:
-        if hasattr(names.get(name), "py_func"):
+        if isinstance(names.get(name), Kernel):
             names[name] = interpreted(names[name])
-    made: Any = FunctionType(plain.__code__, names, plain.__name__, plain.__defaults__)
-    return made  # type: ignore[no-any-return]
+    return cast(Function, FunctionType(plain.__code__, names, plain.__name__, plain.__defaults__))
 
 
-def _whole(function: Function, **options: Any) -> Function:
-    if LEAN and not numba.config.DISABLE_JIT:
-        whole: Function = WholeDispatcher(function, **options)  # type: ignore[assignment]
-        return whole
-    njit: Any = numba.njit
-    compiled: Function = njit(cache=True, **options)(function)
-    return compiled
+def _kernel(function: Function, *, lowered: bool = False, **options: Any) -> Function:
+    return cast(Function, Kernel(function, lowered=lowered, **options))

@@ -19,6 +19,8 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
+from rtsim.kernels import progress
+
 
 class LoweredLibrary(JITCodeLibrary):
     """Code that was lowered and no more."""
@@ -161,6 +163,7 @@ class LoweredDispatcher(WholeDispatcher):
             args, return_type = sigutils.normalize_signature(sig)
             key = self._lowered.get(tuple(args))
             if key is None:
+                progress.note(self.py_func.__name__)
                 result = self._compiler.compile(args, return_type)
                 key = (self, tuple(args))
                 self.targetctx.insert_user_function(key, result.fndesc, [result.library])

@@ -71,6 +71,9 @@ class Packed:
     def __iter__(self) -> Iterator[Any]:
         return iter(self._tuple)
 
+    def __reduce__(self) -> tuple[Any, tuple[Any]]:
+        return packed, (self._tuple,)
+
     def __len__(self) -> int:
         return len(self._tuple)
 

@@ -31,7 +31,7 @@ def address_of(part: Callable[..., Any], *arguments: Any) -> int:
         if part not in _INTERPRETED:
             _INTERPRETED.append(part)
         return 1 + _INTERPRETED.index(part)
-    kernel: Any = part
+    kernel: Any = part.dispatcher
     result = kernel.overloads[compiled_for(kernel, *arguments)]
     assert result.signature.return_type == types.float64, f"{kernel.__name__} returns no float"
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
@@ -56,9 +56,10 @@ def entry_point(kernel: Any, *arguments: Any) -> Callable[..., Any]:
         kernel: The kernel.
         arguments: Arguments of the types that it will be called with, always.
     """
+    dispatcher = kernel.dispatcher
     if numba.config.DISABLE_JIT:
-        return kernel  # type: ignore[no-any-return]
-    entry: Callable[..., Any] = kernel.overloads[compiled_for(kernel, *arguments)].entry_point
+        return dispatcher  # type: ignore[no-any-return]
+    entry: Callable[..., Any] = dispatcher.overloads[compiled_for(dispatcher, *arguments)].entry_point
     return entry
 
 

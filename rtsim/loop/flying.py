@@ -15,11 +15,9 @@ from rtsim.aircraft.variables import INPUT
 from rtsim.atmosphere.air import normals_needed
 from rtsim.frame import SIGNAL_COUNT, FloatArray
 from rtsim.kernels.compiled import interpreted
-from rtsim.kernels.packed import Packed, packed
-from rtsim.kernels.parts import address_of, entry_point
+from rtsim.kernels.packed import packed
+from rtsim.loop import beside
 from rtsim.loop import frame_kernels as frames_of
-from rtsim.loop import part_kernels as parts
-from rtsim.loop import plant_kernels as plants
 from rtsim.loop.data import (
     CLOCK,
     END,
@@ -31,8 +29,8 @@ from rtsim.loop.data import (
     SimulationState,
     SimulationTables,
 )
+from rtsim.loop.loading import entry_of, load_part, part_address
 from rtsim.pilot.engage_kernels import mocm_engage
-from rtsim.protection.law_data import LAW_MONITOR
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 
 WHOLE, COMPLETE = frames_of.WHOLE, frames_of.COMPLETE
@@ -40,8 +38,6 @@ NO_ROWS = np.zeros((0, SIGNAL_COUNT))
 _NO_NORMALS = np.zeros((1, 0))
 _STILL = np.zeros((1, 3))
 """Normals of the air where no time passes."""
-_ADDRESSES: dict[tuple[str, Any], int] = {}
-"""Addresses of compiled parts by name and the types they were compiled for."""
 BLOCK = 2_048
 """Frames for which noise is drawn at a time in a flight that keeps no rows."""
 Streams = tuple[np.random.Generator, np.random.Generator]
@@ -97,23 +93,23 @@ class Flying:
         self.streams = streams
         """Random streams of the pilot's noise and of the turbulence."""
         self.noise_width, self._nonlinear = noise_width, nonlinear
-        for name in ("outputs", "step", "ask", "advance"):
-            self._load(name)
+        self._load("outputs", "step")
+        arguments = (self.flight, NO_ROWS, _NO_NORMALS, _NO_NORMALS, 0, 0)
+        self._entry = entry_of(frames_of.fly_frames, *arguments)
+        self._unlocked: tuple[Any, int] | None = None
+        if unlocked:
+            address = part_address(frames_of.fly_frames, *arguments)
+            self._unlocked = (entry_of(frames_of.fly_unlocked, address, *arguments), address)
+        beside.finish("nonlinear" if nonlinear else "lpv")
+        self._load("ask", "advance")
         if tables.automatic.active:
-            self._load("automatic_rate")
-            self._load("automatic_advance")
+            self._load("automatic_rate", "automatic_advance")
         if tables.script.pulses.shape[0] or tables.script.reaction >= 0.0:
             self._load("script")
         if tables.script.reaction >= 0.0:
             self._load("notice")
         if measure is not None:
-            addresses[PART.measure] = _address(measure[0], self.flight)
-        arguments = (self.flight, NO_ROWS, _NO_NORMALS, _NO_NORMALS, 0, 0)
-        self._entry = _entry(frames_of.fly_frames, arguments)
-        self._unlocked: tuple[Any, int] | None = None
-        if unlocked:
-            address = _address(frames_of.fly_frames, *arguments)
-            self._unlocked = (_entry(frames_of.fly_unlocked, (address, *arguments)), address)
+            addresses[PART.measure] = part_address(measure[0], self.flight)
 
     @property
     def tables(self) -> SimulationTables:
@@ -213,62 +209,9 @@ class Flying:
         return int(self._entry(self.flight, rows, noise, air, frames, stages))
 
     def _load_missing(self) -> None:
-        name = next(name for name, place in PART.asdict().items() if place == int(self.state.clock[CLOCK.missing]) - 1)
-        for one in ("faults", "fail") if name == "faults" else (name,):
-            self._load(one)
+        missing = int(self.state.clock[CLOCK.missing]) - 1
+        self._load(next(name for name, place in PART.asdict().items() if place == missing))
 
-    def _load(self, name: str) -> None:
-        """Compile a part or load it, and note its address."""
-        flight, scratch, state = self.flight, self.scratch, self.state
-        aircraft = flight.tables.plant.aircraft.target
-        if name == "outputs":
-            kernel: Any = plants.outputs_of_nonlinear if self._nonlinear else plants.outputs_of_lpv
-            arguments: tuple[Any, ...] = (aircraft, state.x, state.u, 0.0, scratch.y, scratch.xdot, scratch.work)
-        elif name == "step":
-            kernel = plants.step_of_nonlinear if self._nonlinear else plants.step_of_lpv
-            arguments = (aircraft, state.x, state.u, scratch.path, 0.0, scratch.work)
-        elif name == "decide":
-            # The monitor flies with most flights: it is compiled without what the other laws need.
-            watches = flight.tables.protection.law == LAW_MONITOR
-            kernel, arguments = (parts.watch_law if watches else parts.decide_law), (flight,)
-        else:
-            kernel, arguments = _PARTS[name], (flight, *_MORE.get(name, ()))
-        flight.parts[getattr(PART, name)] = _address(kernel, *arguments)
-
-
-_PARTS: dict[str, Any] = {
-    "ask": parts.ask_mocm,
-    "advance": parts.advance_mocm,
-    "aids": parts.act_aids,
-    "air": parts.move_air,
-    "faults": parts.schedule_faults,
-    "fail": parts.fail_actuators,
-    "automatic_rate": parts.rate_of_automatic_nacelle,
-    "automatic_advance": parts.advance_automatic_nacelle,
-    "script": parts.act_script,
-    "notice": parts.notice_warning,
-}
-_MORE: dict[str, tuple[Any, ...]] = {"advance": (np.zeros(0),), "air": (0.0, np.zeros(0))}
-"""Arguments that a part takes besides the flight."""
-
-
-def _key(kernel: Any, arguments: tuple[Any, ...]) -> tuple[str, Any]:
-    types = tuple(one._kind if isinstance(one, Packed) else type(one) for one in arguments)
-    return kernel.__qualname__, types
-
-
-def _address(kernel: Any, *arguments: Any) -> int:
-    key = _key(kernel, arguments)
-    if key not in _ADDRESSES:
-        _ADDRESSES[key] = address_of(kernel, *arguments)
-    return _ADDRESSES[key]
-
-
-_ENTRIES: dict[tuple[str, Any], Any] = {}
-
-
-def _entry(kernel: Any, arguments: tuple[Any, ...]) -> Any:
-    key = _key(kernel, arguments)
-    if key not in _ENTRIES:
-        _ENTRIES[key] = entry_point(kernel, *arguments)
-    return _ENTRIES[key]
+    def _load(self, *names: str) -> None:
+        for name in names:
+            load_part(self.flight, name, nonlinear=self._nonlinear)

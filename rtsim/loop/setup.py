@@ -27,6 +27,7 @@ from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
+from rtsim.loop import beside
 from rtsim.loop import frame_kernels as frames_of
 from rtsim.loop.data import (
     CHANNEL,
@@ -183,10 +184,11 @@ def build_parts(setup: FlightSetup) -> Parts:
         InputError: The start has no trim.
     """
     options = setup.options
+    nonlinear = options.plant == "nonlinear"
+    beside.start("nonlinear" if nonlinear else "lpv")
     loaded = load_database(options.database or None)
     database = flown_database(loaded, options.database or None)
     profile = database.profile
-    nonlinear = options.plant == "nonlinear"
     if nonlinear and not profile.is_xv15:
         raise InputError(
             f"there is no nonlinear model of the {profile.name}", key="plant", value=options.plant,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,9 @@ import numpy.typing as npt
 from rtsim.aircraft.points import TrimPoint
 from rtsim.aircraft.variables import position, required_position
 from rtsim.errors import InputError, TrimError
+from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.packed import packed
+from rtsim.kernels.parts import entry_point
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
@@ -23,6 +27,7 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 
+_DERIVATIVE, _OUTPUTS = interpreted(kernels.lpv_derivative), interpreted(kernels.lpv_outputs)
 TRIM_TOLERANCE = 1e-9
 """Largest state derivative left by a trim of the LPV aircraft."""
 
@@ -40,14 +45,16 @@ class LpvAircraft:
     tables: kernels.LpvTables = field(init=False, repr=False)
     """What the compiled kernels take."""
     _work: FloatArray = field(init=False, repr=False)
-    _path: FloatArray = field(init=False, repr=False)
+    _stepping: kernels.Stepping = field(init=False, repr=False)
+    _step: Callable[..., float] | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         """Pack the database for the kernels."""
         tables = prepare_tables(self.database, self.form, refresh=self.refresh)
         object.__setattr__(self, "tables", tables)
-        object.__setattr__(self, "_work", np.zeros(kernels.work_size(tables)))
-        object.__setattr__(self, "_path", np.zeros((3, 3)))
+        object.__setattr__(self, "_work", np.zeros(interpreted(kernels.work_size)(tables)))
+        stepping = kernels.Stepping(tables, self._work, np.zeros((3, 3)))
+        object.__setattr__(self, "_stepping", packed(stepping))
 
     @property
     def flags(self) -> int:
@@ -109,10 +116,14 @@ class LpvAircraft:
         Returns:
             A new array: the state at the end (nx,). ``flags`` tells whether the grid was left.
         """
-        end = x.copy()
-        kernels.lpv_step_steady(
-            self.tables, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt, self._work, self._path
-        )
+        # The held entry point looks at no types: these are the ones it was compiled for.
+        end, u = np.array(x, dtype=np.float64, order="C"), np.ascontiguousarray(u, dtype=np.float64)
+        step = self._step
+        if step is None:
+            arguments = (self._stepping, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt)
+            step = entry_point(kernels.lpv_step_steady, *arguments)
+            object.__setattr__(self, "_step", step)
+        step(self._stepping, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt)
         return end
 
     def trim(self, *, airspeed: float, nacelle: float, acceleration: float = 0.0) -> TrimPoint:
@@ -133,7 +144,10 @@ class LpvAircraft:
         x, u, free = self._interpolated_trim(airspeed, nacelle, acceleration)
         unknown = np.concatenate([np.flatnonzero(np.arange(x.size) != self._altitude()), x.size + free])
         z = np.concatenate([x, u])
-        residual = self._trim_residual(z, airspeed, nacelle, acceleration)
+        # Where the database holds the trim itself nothing is solved, and nothing is compiled for it.
+        residual = self._trim_residual(_DERIVATIVE, z, airspeed, nacelle, acceleration)
+        solved = np.max(np.abs(residual)) < TRIM_TOLERANCE
+        derivative, outputs = (_DERIVATIVE, _OUTPUTS) if solved else (kernels.lpv_derivative, kernels.lpv_outputs)
         for _ in range(20):
             if np.max(np.abs(residual)) < TRIM_TOLERANCE:
                 break
@@ -142,14 +156,19 @@ class LpvAircraft:
                 step = 1e-6 * max(1.0, abs(z[k]))
                 shifted = z.copy()
                 shifted[k] += step
-                jacobian[:, column] = (self._trim_residual(shifted, airspeed, nacelle, acceleration) - residual) / step
+                jacobian[:, column] = (
+                    self._trim_residual(derivative, shifted, airspeed, nacelle, acceleration) - residual
+                ) / step
             z[unknown] -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-            residual = self._trim_residual(z, airspeed, nacelle, acceleration)
+            residual = self._trim_residual(derivative, z, airspeed, nacelle, acceleration)
         x, u = z[: x.size].copy(), z[x.size :].copy()
-        xdot = self.derivative(x, u, nacelle)
+        xdot, y = np.empty(x.size), np.empty(len(self.database.outputs))
+        self._work[kernels.W_FLAGS] = 0.0
+        derivative(self.tables, x, u, nacelle, xdot, self._work)
         inside = self.flags == 0
+        outputs(self.tables, x, u, nacelle, y, self._work)
         worst = float(np.max(np.abs(residual)))
-        return TrimPoint(x, u, self.outputs(x, u, nacelle), xdot, bool(inside and worst < 1e-6), worst)
+        return TrimPoint(x, u, y, xdot, bool(inside and worst < 1e-6), worst)
 
     def linearize(self, *, airspeed: float, nacelle: float) -> control.StateSpace:
         """Linear model of level flight, interpolated between the grid points.
@@ -247,13 +266,17 @@ class LpvAircraft:
             parts.append((1.0 - share) * near + share * far)
         return parts[0], parts[1], free
 
-    def _trim_residual(self, z: FloatArray, airspeed: float, nacelle: float, acceleration: float) -> FloatArray:
+    def _trim_residual(
+        self, derivative: Callable[..., None], z: FloatArray, airspeed: float, nacelle: float, acceleration: float
+    ) -> FloatArray:
         """State derivative minus the wanted one, and the airspeed that is missing."""
         d = self.database
         nx = len(d.states)
         x, u = z[:nx], z[nx:]
         iu, iw, ip = (required_position(d.states, name, "trim") for name in ("u", "w", "pitch"))
-        rest = self.derivative(x, u, nacelle)
+        rest = np.empty(nx)
+        self._work[kernels.W_FLAGS] = 0.0
+        derivative(self.tables, x, u, nacelle, rest, self._work)
         rest[iu] -= acceleration * np.cos(x[ip])
         rest[iw] -= acceleration * np.sin(x[ip])
         return np.append(rest, x[iu] * np.cos(x[ip]) + x[iw] * np.sin(x[ip]) - airspeed)

@@ -7,8 +7,9 @@ tables and their legend are in ``rtsim.lpv.schedule_kernels``.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.compiled import inner_kernel, part
 from rtsim.lpv.schedule_kernels import (
     FLAG_AIRSPEED_HIGH,
     FLAG_AIRSPEED_LOW,
@@ -285,38 +286,46 @@ def lpv_step(
         x[k] += dt / 6.0 * total[k]
 
 
-@inner_kernel
+class Stepping(NamedTuple):
+    """An LPV aircraft with the work space of its steps."""
+
+    tables: LpvTables
+    """Prepared tables."""
+    work: FloatArray
+    """Scratch of ``work_size(tables)`` values."""
+    path: FloatArray
+    """Scratch (3, 3) for the nacelle path."""
+
+
+@part
 def lpv_step_steady(
-    tables: LpvTables,
+    stepping: Stepping,
     x: FloatArray,
     u: FloatArray,
     nacelle_angle: float,
     nacelle_rate: float,
     nacelle_acceleration: float,
     dt: float,
-    work: FloatArray,
-    path: FloatArray,
-) -> int:
+) -> float:
     """``lpv_step`` with constant nacelle acceleration over the step.
 
     Args:
-        tables: Prepared tables.
+        stepping: The aircraft and its work space.
         x: Total state (nx,); replaced by the state at the end of the step.
         u: Total input (nu,).
         nacelle_angle: Angle at the start of the step [rad].
         nacelle_rate: Rate at the start of the step [rad/s].
         nacelle_acceleration: Acceleration during the step [rad/s^2].
         dt: Length of the step [s].
-        work: Scratch of ``work_size(tables)`` values.
-        path: Scratch (3, 3) for the nacelle path.
 
     Returns:
         The flags of the step (``FLAG_*``), 0 where all was inside the grid.
     """
+    path = stepping.path
     for row in range(3):
         t = 0.5 * dt * row
         path[row, 0] = nacelle_angle + t * (nacelle_rate + 0.5 * t * nacelle_acceleration)
         path[row, 1] = nacelle_rate + t * nacelle_acceleration
         path[row, 2] = nacelle_acceleration
-    lpv_step(tables, x, u, path, dt, work)
-    return int(work[W_FLAGS])
+    lpv_step(stepping.tables, x, u, path, dt, stepping.work)
+    return float(stepping.work[W_FLAGS])

@@ -193,6 +193,14 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
     )
 
 
+def compile_watch() -> None:
+    """Compile, or load, what watches the rows of a flight."""
+    tables = monitor_tables("design", load_database())
+    none, sensors = np.zeros((0, KIND_COUNT)), np.zeros((0, SENSOR.size))
+    levels = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
+    monitor_kernels.watch(tables, sensors, np.zeros(0), 0.004, levels, none, none)
+
+
 def sensor_array(sensors: Sensors) -> FloatArray:
     """Sensor values as the kernels take them, shape (SENSOR.size,).
 

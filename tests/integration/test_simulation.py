@@ -72,7 +72,6 @@ def test_snapshot_names_every_array_the_frame_changes() -> None:
     simulation.restore(snapshot)
     for array in simulation._scratch:
         array.fill(np.nan)
-    simulation._row.fill(np.nan)
     simulation._observed = False
     np.testing.assert_array_equal(simulation.run(200), expected)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -259,8 +260,9 @@ def test_a_new_option_needs_its_declaration_alone(tmp_path: Path) -> None:
     (tmp_path / "docs_tables.py").write_text((ROOT / "docs" / "tables.py").read_text(encoding="utf-8"))
     program = f"SCENARIO = {SCENARIO!r}\nCAMPAIGN = {CAMPAIGN!r}\n{TOY}"
     (tmp_path / "toy.py").write_text(program, encoding="utf-8")
+    paths = {**os.environ, "PYTHONPATH": str(ROOT)}
     ended = subprocess.run(
-        [sys.executable, str(tmp_path / "toy.py")], capture_output=True, text=True, cwd=ROOT, check=False
+        [sys.executable, str(tmp_path / "toy.py")], capture_output=True, text=True, cwd=ROOT, env=paths, check=False
     )
     assert ended.returncode == 0, ended.stderr
     found = json.loads(ended.stdout)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rtsim.kernels.compiled import interpreted
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv import schedule_kernels as schedule
 from rtsim.lpv.tables import prepare_tables
@@ -207,11 +208,11 @@ def test_interpolating_once_per_step_changes_little(toy_database, refresh):
     ends = []
     for how in (refresh, "stage"):
         tables = prepare_tables(toy_database, refresh=how)
-        work, path = np.zeros(kernels.work_size(tables)), np.zeros((3, 3))
+        stepping = kernels.Stepping(tables, np.zeros(interpreted(kernels.work_size)(tables)), np.zeros((3, 3)))
         x, u = toy_database.x_ref[1, 6, 8].copy(), toy_database.u_ref[1, 6, 8].copy()
         u[1] += 0.02
         for frame in range(250):
-            kernels.lpv_step_steady(tables, x, u, 1.4 - 0.0002 * frame, -0.05, 0.0, 0.004, work, path)
+            kernels.lpv_step_steady(stepping, x, u, 1.4 - 0.0002 * frame, -0.05, 0.0, 0.004)
         ends.append(x)
     assert np.abs(ends[0] - ends[1]).max() < 2e-4
     assert np.abs(ends[0] - ends[1]).max() > 0.0
@@ -259,13 +260,13 @@ def test_accelerated_trim_accelerates(toy_database):
 )
 def test_outside_the_grid_is_flagged(toy_database, airspeed, nacelle, flag):
     tables = prepare_tables(toy_database)
-    work, path = np.zeros(kernels.work_size(tables)), np.zeros((3, 3))
+    stepping = kernels.Stepping(tables, np.zeros(interpreted(kernels.work_size)(tables)), np.zeros((3, 3)))
     x, u = toy_database.x_ref[1, 9, 5].copy(), toy_database.u_ref[1, 9, 5]
     x[2], x[3], x[1] = airspeed, 0.0, 0.0
-    assert kernels.lpv_step_steady(tables, x, u, nacelle, 0.0, 0.0, 0.001, work, path) & 15 == flag
+    assert int(kernels.lpv_step_steady(stepping, x, u, nacelle, 0.0, 0.0, 0.001)) & 15 == flag
     # and the flags do not stick
     x[:] = toy_database.x_ref[1, 9, 5]
-    assert kernels.lpv_step_steady(tables, x, u, toy_database.nacelle[5], 0.0, 0.0, 0.001, work, path) == 0
+    assert kernels.lpv_step_steady(stepping, x, u, toy_database.nacelle[5], 0.0, 0.0, 0.001) == 0
 
 
 @settings(max_examples=80, deadline=None)

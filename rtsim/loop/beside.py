@@ -1,0 +1,105 @@
+"""Compiles half of a first flight's kernels in a process beside it: they meet in the kernel cache.
+
+numba compiles under one lock, so threads do not help. The flight compiles the aircraft and the frame, this the pilot,
+the monitor and the limit watch. Should it fail, the flight compiles them itself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+CHILD = "RTSIM_COMPILES_BESIDE"
+"""Set in the environment of the process beside."""
+_running: list[subprocess.Popen[bytes]] = []
+
+
+def marker(plant: str) -> Path | None:
+    """File that stands in the kernel cache once a flight of this plant has been compiled; None where nothing is kept.
+
+    Args:
+        plant: Aircraft model.
+    """
+    configuration: Any = numba.config  # its names are made at run time
+    folder = configuration.CACHE_DIR
+    return Path(folder) / f"compiled-{plant}" if folder and not configuration.DISABLE_JIT else None
+
+
+def start(plant: str) -> None:
+    """Begin to compile beside, if this is the first flight of a plant and there is a core to spare.
+
+    Args:
+        plant: ``lpv`` or ``nonlinear``.
+    """
+    place = marker(plant)
+    if _running or place is None or place.exists() or CHILD in os.environ or (os.cpu_count() or 1) < 2:
+        return
+    root = str(Path(__file__).resolve().parents[2])
+    paths = [root, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+    environment = {**os.environ, CHILD: "1", "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
+    with contextlib.suppress(OSError):  # then the flight compiles all of it
+        _running.append(
+            subprocess.Popen(
+                [sys.executable, "-m", "rtsim.loop.beside"],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        )
+        atexit.register(_end)
+
+
+def finish(plant: str) -> None:
+    """Wait until all is compiled that the process beside compiles, and remember that this plant has been flown.
+
+    Args:
+        plant: ``lpv`` or ``nonlinear``.
+    """
+    for process in _running:
+        process.wait()
+    _running.clear()
+    place = marker(plant)
+    if place is not None and CHILD not in os.environ and not place.exists():
+        with contextlib.suppress(OSError):
+            place.touch()
+
+
+def _end() -> None:
+    """The flight gave up while it was compiled: so does the process beside it."""
+    for process in _running:
+        process.kill()
+        process.wait()
+
+
+def main() -> None:
+    """Compile the parts that are not the flight's own half."""
+    from rtsim.kernels.packed import packed
+    from rtsim.loop.data import PART, Flight
+    from rtsim.loop.loading import load_part
+    from rtsim.loop.setup import FlightSetup, build_parts, new_scratch, start_state
+    from rtsim.programme import Programme
+    from rtsim.protection.monitor import compile_watch
+
+    programme = Programme.hold(airspeed=0.0, nacelle_angle=math.pi / 2.0, altitude=100.0)
+    setup = FlightSetup(programme=programme).with_options(protection="monitor")
+    parts = build_parts(setup)
+    state, addresses = start_state(setup, parts, np.zeros(3)), np.zeros(PART.size, dtype=np.int64)
+    flight = packed(Flight(parts.tables, state, new_scratch(parts.tables), np.zeros(0), addresses))
+    for name in ("ask", "advance", "decide"):
+        load_part(flight, name, nonlinear=False)
+    compile_watch()
+
+
+if __name__ == "__main__":
+    main()
