@@ -185,10 +185,9 @@ class Simulation:
         Returns:
             The frame's row, shape (SIGNAL_COUNT,), a new array.
         """
-        rows: FloatArray = np.empty((1, SIGNAL_COUNT))
-        row: FloatArray = rows[0]
+        row: FloatArray = np.empty(SIGNAL_COUNT)
         if command is None and applied is None:
-            self._fly(rows, 1, WHOLE)
+            self._fly(row, 1, WHOLE)
             return row
         stations = self._scratch.command
         if command is None:
@@ -197,7 +196,7 @@ class Simulation:
             stations[STATION.pilot] = stations[STATION.hands] = _numbers(command)
         if applied is not None:
             stations[STATION.hands] = _numbers(applied)
-        self._fly(rows, 1, OBSERVE | LIMIT | COMPLETE | (SCRIPT if scripted else 0))
+        self._fly(row, 1, OBSERVE | LIMIT | COMPLETE | (SCRIPT if scripted else 0))
         return row
 
     def run(self, frames: int, rows: FloatArray | None = None) -> FloatArray:
@@ -211,7 +210,7 @@ class Simulation:
             The rows, shape (frames flown, SIGNAL_COUNT).
         """
         rows = np.empty((frames, SIGNAL_COUNT)) if rows is None else rows
-        return rows[: self._fly(rows, frames, WHOLE)]
+        return rows[: self._fly(rows.reshape(-1), frames, WHOLE)]
 
     def _fly(self, rows: FloatArray, frames: int, stages: int) -> int:
         """Fly frames, the first with these stages, asking the laws in Python where they are due."""
@@ -400,7 +399,7 @@ def fly_with_laws(flying: Flying, laws: LawChain, rows: FloatArray, frames: int,
     Args:
         flying: The flight.
         laws: The laws.
-        rows: Written: their rows, shape (frames, SIGNAL_COUNT).
+        rows: Written: their rows, frames * SIGNAL_COUNT numbers.
         frames: How many at most.
         stages: Stages of the first frame.
 
@@ -418,7 +417,7 @@ def fly_with_laws(flying: Flying, laws: LawChain, rows: FloatArray, frames: int,
             state.held[:] = laws.held
             stages = COMPLETE
         block = min(frames - flown, laws.every - frame % laws.every)
-        flown += flying.fly(rows[flown:], block, stages)
+        flown += flying.fly(rows[flown * SIGNAL_COUNT :], block, stages)
         stages = WHOLE
     return flown
 
