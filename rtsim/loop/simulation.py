@@ -21,7 +21,7 @@ from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
 from rtsim.kernels.compiled import interpreted
-from rtsim.loop.data import CLOCK, END_REASONS, MODES, STATION, TARGET, SimulationState
+from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState
 from rtsim.loop.flying import WHOLE, Flying
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
@@ -406,15 +406,15 @@ def fly_with_laws(flying: Flying, laws: LawChain, rows: FloatArray, frames: int,
     Returns:
         How many were flown.
     """
-    state, scratch = flying.state, flying.scratch
+    clock, held, scratch = flying.state.clock, flying.state.held, flying.scratch
+    protected, sensors, shown = scratch.command[STATION.protected], scratch.sensors, scratch.shown
     flown = 0
-    while flown < frames and not flying.ended:
-        frame = int(state.clock[CLOCK.frame])
+    while flown < frames and clock.item(CLOCK.end) == END.none:
+        frame = int(clock.item(CLOCK.frame))
         if laws.due(frame):
             flying.do(stages & ~COMPLETE)
-            command = Command(*scratch.command[STATION.protected].tolist())
-            laws.decide(frame, sensors_of(scratch.sensors), command, Margins(*scratch.shown[1:].tolist()))
-            state.held[:] = laws.held
+            laws.decide(frame, sensors_of(sensors), Command(*protected.tolist()), Margins(*shown.tolist()[1:]))
+            held[:] = laws.held
             stages = COMPLETE
         block = min(frames - flown, laws.every - frame % laws.every)
         flown += flying.fly(rows[flown * SIGNAL_COUNT :], block, stages)
