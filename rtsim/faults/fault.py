@@ -124,13 +124,16 @@ class Fault:
 
         Args:
             profile: The aircraft, whose other engine counts; None: the XV-15.
+
+        Raises:
+            InputError: The failing engine would give more than a sound one.
         """
         if self.stop is not None:
             return 1.0 if self.stop == "high" else -1.0
         if self.power is not None:
             aircraft = xv15_profile() if profile is None else profile
-            left = min(self.power, engine_rating(aircraft, "contingency"))
-            return transmission_efficiency(aircraft) * (left + engine_rating(aircraft, self.other_engine))
+            _within("power", self.power, 0.0, engine_rating(aircraft, "contingency"), "W")
+            return transmission_efficiency(aircraft) * (self.power + engine_rating(aircraft, self.other_engine))
         for number in (self.bias, self.rate):
             if number is not None:
                 return number

@@ -17,6 +17,7 @@ from rtsim.aids.aids_kernels import MAP_PITCH_DAMPING
 from rtsim.aircraft.profile import parse_profile, xv15_profile
 from rtsim.aircraft.variables import position
 from rtsim.errors import InputError
+from rtsim.faults import Fault
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
@@ -26,10 +27,11 @@ from rtsim.optimization.report import scenario_text
 from rtsim.optimization.search import run_search
 from rtsim.optimization.spec import SearchSpec, load_spec
 from rtsim.protection.limits import load_limits
-from rtsim.units import deg, kt
+from rtsim.units import HORSEPOWER, INCH_POUND, deg, kt
 from scenarios.campaign.chunks import Chunk, LawVariant, Task, fly_chunk
 from scenarios.files.loader import load_scenario
 from scenarios.files.options import Overrides
+from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config
 from scenarios.verdicts import tester
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "second_tiltrotor"
@@ -243,3 +245,30 @@ def shuffled(database: Database) -> Database:
         C=database.C[..., y, :][..., x],
         D=database.D[..., y, :][..., u],
     )
+
+
+def test_ground_stations_see_shares_of_its_own_torque_and_rotor_speed(folder: Path) -> None:
+    shipped = mavlink_config(MavlinkOptions(), load_scenario("hover"))[0].ratings
+    limits = load_limits().torque
+    assert (shipped.torque_inlb, shipped.hover_torque_inlb) == pytest.approx(
+        (limits.cruise / INCH_POUND, limits.takeoff / INCH_POUND)
+    )
+    own = mavlink_config(MavlinkOptions(), load_scenario(folder / "conversion.toml"))[0].ratings
+    assert own.torque_inlb == pytest.approx(21800.0)
+    assert own.rotor_speed_rpm == pytest.approx(589.0 / 0.8)
+
+
+def test_the_paper_is_not_reproduced_with_another_aircraft(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from rtsim.cli.main import run
+
+    assert run(["reproduce", "--out", str(folder / "paper"), "--database", str(folder / "two_thirds.nc")]) == 2
+    assert "the paper's claims are about the XV-15" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_failure_is_one_of_its_own_engines(folder: Path) -> None:
+    own = load_database(folder / "two_thirds.nc").profile
+    fault = Fault(kind="engine-limit", start=0.0, power=200.0 * HORSEPOWER, other_engine="takeoff")
+    assert fault.size(own) == pytest.approx(0.94 * (200.0 + 325.0) * HORSEPOWER)
+    assert fault.size() == pytest.approx(0.93 * (200.0 + 1550.0) * HORSEPOWER)
+    with pytest.raises(InputError, match="power: is out of range"):
+        Fault(kind="engine-limit", start=0.0, power=1000.0 * HORSEPOWER).size(own)
