@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
 from rtsim.pilot.layout_kernels import PilotRoles, PilotTables, noise_width, pilot_state_size
 from rtsim.pilot.problem import FloatArray
-from rtsim.pilot.schedule import ScheduledPilot
+
+if TYPE_CHECKING:
+    from rtsim.pilot.schedule import ScheduledPilot  # which designs pilots, with scipy
 
 __all__ = ["PilotTables", "load_pilot_tables", "noise_width", "pack_pilot", "pilot_state_size"]
 
@@ -51,9 +54,13 @@ def load_pilot_tables(database: Database, outer_loop: OuterLoop = "integrators",
             allowed=", ".join(database.pilot) or "none",
             mend="design them with rtsim model import FILE --design-pilots",
         )  # fmt: skip
-    key = f"{database.content_hash} {outer_loop} {dt!r}".encode()
-    pilot = database.pilot[outer_loop]
-    return packed(kept("pilot", key, lambda: _tables(database, ScheduledPilot.from_arrays(pilot), dt)))
+
+    def prepare() -> PilotTables:
+        from rtsim.pilot.schedule import ScheduledPilot
+
+        return _tables(database, ScheduledPilot.from_arrays(database.pilot[outer_loop]), dt)
+
+    return packed(kept("pilot", f"{database.content_hash} {outer_loop} {dt!r}".encode(), prepare))
 
 
 def pack_pilot(database: Database, pilot: ScheduledPilot, *, dt: float) -> PilotTables:
