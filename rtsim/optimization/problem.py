@@ -14,7 +14,7 @@ from rtsim.frame import FloatArray
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup
-from rtsim.measures.figures import FlightFigures, objective_value
+from rtsim.measures.metrics import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import ConversionPath, path_through
 from rtsim.optimization.paths import FINAL_AIRSPEED_KT, PATH_NAMES, paper_path

@@ -16,12 +16,9 @@ from rtsim.loop.data import SimulationTables
 from rtsim.loop.script_kernels import S_YIELDED
 from rtsim.loop.setup import FlightSetup, build_parts, start_trim
 from rtsim.loop.simulation import Simulation
-from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
+from rtsim.measures.metrics import TrialMetrics, measured
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
-from rtsim.protection.limits import load_limits
-from rtsim.units import to_deg
-from scenarios.campaign import trial_kernels as kernels
 
 if TYPE_CHECKING:
     from rtsim.command import Pilot
@@ -68,8 +65,6 @@ class Bench:
     def __init__(self) -> None:
         """Make room for a history when there is one."""
         self._rows = np.zeros((0, SIGNAL_COUNT))
-        limits = load_limits()
-        self._limits = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
 
     def fly(
         self,
@@ -117,11 +112,9 @@ class Bench:
         if chain is not None and repeat:
             chain.unrepeatable()
         problems = () if chain is None else tuple(event.text for event in chain.events)
-        metrics = np.zeros(kernels.METRIC_COUNT)
-        kernels.measure_trial(rows, simulation.tables.programme, self._limits, simulation.dt, metrics)
-        metrics[kernels.M_COMPLETED] = float(not simulation.finished)
-        metrics[kernels.M_YIELDED] = simulation.flying.state.script[S_YIELDED]
-        return TrialFlight(TrialMetrics(metrics), simulation.end_reason, rows.copy() if keep else rows, problems)
+        yielded = bool(simulation.flying.state.script[S_YIELDED])
+        numbers = measured(rows, setup.programme, simulation.dt, ended=simulation.finished, yielded=yielded)
+        return TrialFlight(TrialMetrics(numbers), simulation.end_reason, rows.copy() if keep else rows, problems)
 
 
 def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtsim.frame import FloatArray
-from rtsim.measures.trial_metrics import METRIC_PLACE
+from rtsim.measures.metric_kernels import VALUE
 from scenarios.campaign.chunks import LawVariant
 from scenarios.campaign.spec import CampaignFile, ExpectRate
 from scenarios.campaign.statistics import Rate, bound_decided, flights_to_bound, mcnemar, quantile, rate
@@ -29,7 +29,7 @@ class Flights:
     laws: tuple[LawVariant, ...]
     """The laws; the last is ``off``."""
     metrics: tuple[FloatArray, ...]
-    """By class: metrics, shape (runs, laws, METRIC_COUNT)."""
+    """By class: metrics, shape (runs, laws, VALUE.size)."""
     planned: tuple[int, ...]
     """By class: runs of the whole campaign."""
 
@@ -197,13 +197,13 @@ def _law_summary(flights: Flights, place: int, seed: int) -> dict[str, Any]:
         events[event] = _rate(happened, flights)
     metrics = np.concatenate([values[:, place] for values in flights.metrics])
     off = np.concatenate([values[:, flights.off] for values in flights.metrics])
-    outside = metrics[metrics[:, METRIC_PLACE["exceedances"]] > 0.0]
+    outside = metrics[metrics[:, VALUE.exceedances] > 0.0]
 
     def spread(values: FloatArray, share: float) -> dict[str, float]:
         return asdict(quantile(values, share, seed=seed % 2**32 + BOOTSTRAP_SEED, confidence=confidence))
 
     def column(name: str, values: FloatArray) -> FloatArray:
-        picked: FloatArray = values[:, METRIC_PLACE[name]]
+        picked: FloatArray = values[:, getattr(VALUE, name)]
         return picked
 
     lost = column("height_lost_m", metrics)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from rtsim.frame import COLUMN, FloatArray
-from rtsim.measures.trial_metrics import PITCH_LIMIT_DEG
 from rtsim.protection import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, load_limits
@@ -172,7 +171,7 @@ def _draw_shares(axes: Any, flights: Sequence[tuple[str, FloatArray, str]]) -> N
         lines = (
             ("mast torque", rows[:, COLUMN.mast_torque_inlb] / np.array(allowed), "#c77700"),
             ("flapping", rows[:, COLUMN.flapping_deg] / float(to_deg(limits.flapping)), "#00796b"),
-            ("pitch", np.abs(rows[:, COLUMN.pitch_deg]) / PITCH_LIMIT_DEG, "#ad1457"),
+            ("pitch", np.abs(rows[:, COLUMN.pitch_deg]) / float(to_deg(limits.pitch)), "#ad1457"),
         )
         last = label == flights[-1][0]
         for name, values, colour in lines:

@@ -10,7 +10,7 @@ import pytest
 from rtsim.analysis.path_stability import path_stability
 from rtsim.errors import InputError
 from rtsim.loop.simulation import Simulation
-from rtsim.measures.figures import figures_of_rows, objective_value
+from rtsim.measures.metrics import FlightFigures, measured, objective_value
 from rtsim.optimization.paths import fast_side, paper_path, table_1
 from rtsim.optimization.problem import CONSTRAINTS, ConversionProblem
 from rtsim.optimization.report import baseline_summary, best_path, nonlinear_check, scenario_text
@@ -120,12 +120,18 @@ def test_the_winner_flies_again_with_the_same_figures_to_the_last_bit(problem, f
     assert record.completed
     assert record.metrics is not None
     assert record.metrics.flapping_deg.integral_deg_s == found.objectives[0]
-    assert figures_of_rows(record.rows, 1.0 / scenario.options.rate_hz) == problem.fly([path])[0][0]
+    assert (
+        FlightFigures(measured(record.rows, scenario.programme, 1.0 / scenario.options.rate_hz))
+        == problem.fly([path])[0][0]
+    )
     assert all(verdict.held for verdict in record.verdicts)
     # The same flight by hand.
     simulation = Simulation(dataclasses.replace(problem.setup, programme=path.programme()))
     rows = simulation.run(len(record.rows))
-    assert objective_value(figures_of_rows(rows, simulation.dt), "flapping_integral") == found.objectives[0]
+    assert (
+        objective_value(FlightFigures(measured(rows, path.programme(), simulation.dt)), "flapping_integral")
+        == found.objectives[0]
+    )
 
 
 def test_the_nonlinear_model_flies_the_winner(problem, found):
