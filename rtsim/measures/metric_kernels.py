@@ -1,8 +1,8 @@
 """Everything a flight is measured by: declared in one table, summed up frame by frame.
 
-A new metric is a line of ``METRICS``, and a place in ``SUM`` with what ``metrics_step`` adds to it in every frame; names
-in scenarios, campaigns, searches, JSON and reports follow. A flight is measured while it is flown (``add_metrics``) or
-from its rows (``measure_rows``), by the same step: the same to the last bit.
+A new metric is a line of ``METRICS``, and a place in ``SUM`` with what ``metrics_step`` adds to it in every frame;
+names in scenarios, campaigns, searches, JSON and reports follow. A flight is measured while it is flown
+(``add_metrics``) or from its rows (``measure_rows``), by the same step: the same to the last bit.
 """
 
 from __future__ import annotations

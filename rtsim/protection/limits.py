@@ -1,86 +1,31 @@
-"""The limits that are watched, their names and numbers, from ``data/protection.toml``."""
+"""The numbers of the limits that are watched, and of the laws, from ``data/protection.toml``."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import Any, Literal
+from types import SimpleNamespace
+from typing import Any
 
 from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
-from rtsim.units import INCH_POUND, deg, kt
+from rtsim.protection.monitor_kernels import LIMIT_WORDS
+from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt
 
-LimitKind = Literal[
-    "stall_attitude",
-    "load_torque",
-    "downstop_gate",
-    "nacelle_range",
-    "nacelle_rate",
-    "flap_stop",
-    "mast_torque",
-    "load_factor",
-    "pitch_attitude",
-    "consistency",
-    "sink",
-]
-LIMIT_KINDS: tuple[LimitKind, ...] = (
-    "stall_attitude",
-    "load_torque",
-    "downstop_gate",
-    "nacelle_range",
-    "nacelle_rate",
-    "flap_stop",
-    "mast_torque",
-    "load_factor",
-    "pitch_attitude",
-    "consistency",
-    "sink",
-)
+LIMIT_KINDS = tuple(name for name in LIMIT_WORDS if name != "time_to_limit")
 """Limits by name; the number of a limit is its place here, and a recorded reason is that number plus one."""
-LIMIT_WORDS: dict[str, str] = {
-    "stall_attitude": "low-speed side of the corridor",
-    "load_torque": "high-speed side of the corridor",
-    "downstop_gate": "downstop gate",
-    "nacelle_range": "nacelle range",
-    "nacelle_rate": "nacelle rate",
-    "flap_stop": "flapping",
-    "mast_torque": "mast torque",
-    "load_factor": "load factor",
-    "pitch_attitude": "pitch attitude",
-    "consistency": "aircraft's own trims",
-    "sink": "sink rate",
-    "time_to_limit": "time to the corridor's boundary",
-}
-"""Limits, and the time to the corridor's boundary, in words for people."""
+_SCALES = {"_deg_s": DEGREE, "_deg": DEGREE, "_kt": KNOT, "_inlb": INCH_POUND, "_m_s": 1.0, "_m": 1.0, "_s": 1.0}
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits besides the corridor. SI and radians."""
+class Limits(SimpleNamespace):
+    """Limits besides the corridor: every number under ``[limits]`` by its key without the unit, SI and radians."""
 
-    flapping: float
-    """Gimbal flapping at the stop [rad]."""
     torque: TorqueTables
     """Mast torque."""
     sink: SinkTables
     """Sink rate."""
-    load_factor_max: float
-    """Largest load factor."""
-    load_factor_min: float
-    """Smallest load factor."""
-    pitch: float
-    """Pitch attitude, either way [rad]."""
-    nacelle_forward: float
-    """Smallest nacelle angle [rad]."""
-    nacelle_aft: float
-    """Largest nacelle angle [rad]."""
-    nacelle_rate: float
-    """Fastest nacelle motion [rad/s]."""
-    plant_guard: float
-    """Distance a law's low side keeps from where the plant's unstalled trims end [m/s]."""
 
 
 @cache
@@ -93,29 +38,30 @@ def protection_data() -> dict[str, Any]:
 @cache
 def load_limits() -> Limits:
     """Give the XV-15's limits."""
-    data = protection_data()["limits"]
+    numbers = dict(_si(key, value) for key, value in protection_data()["limits"].items() if not isinstance(value, str))
     return Limits(
-        flapping=deg(data["flapping_deg"]),
         torque=TorqueTables(
-            cruise=data["mast_torque_inlb"] * INCH_POUND,
-            takeoff=data["mast_torque_takeoff_inlb"] * INCH_POUND,
-            takeoff_nacelle=deg(data["takeoff_nacelle_above_deg"]),
-            takeoff_airspeed=kt(data["takeoff_airspeed_below_kt"]),
+            cruise=numbers["mast_torque"],
+            takeoff=numbers["mast_torque_takeoff"],
+            takeoff_nacelle=numbers["takeoff_nacelle_above"],
+            takeoff_airspeed=numbers["takeoff_airspeed_below"],
         ),
         sink=SinkTables(
-            floor=data["sink_rate_m_s"],
-            slope=math.sin(deg(data["sink_angle_deg"])),
-            height=data["sink_height_m"],
-            time=data["sink_time_s"],
+            floor=numbers["sink_rate"],
+            slope=math.sin(numbers["sink_angle"]),
+            height=numbers["sink_height"],
+            time=numbers["sink_time"],
         ),
-        load_factor_max=data["load_factor_max"],
-        load_factor_min=data["load_factor_min"],
-        pitch=deg(data["pitch_deg"]),
-        nacelle_forward=deg(data["nacelle_forward_deg"]),
-        nacelle_aft=deg(data["nacelle_aft_deg"]),
-        nacelle_rate=deg(data["nacelle_rate_deg_s"]),
-        plant_guard=kt(data["plant_guard_kt"]),
+        **numbers,
     )
+
+
+def _si(key: str, value: float) -> tuple[str, float]:
+    """A number by its name without the unit, SI and radians."""
+    for unit, scale in _SCALES.items():
+        if key.endswith(unit):
+            return key.removesuffix(unit), value * scale
+    return key, value
 
 
 def load_weights() -> RegulatorWeights:

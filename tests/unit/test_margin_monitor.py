@@ -14,8 +14,8 @@ from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
-from rtsim.protection.limits import LIMIT_KINDS
-from rtsim.protection.monitor import WATCHED, MarginHistory, sensor_array, sensors_of_rows, severity
+from rtsim.protection.limits import LIMIT_KINDS, load_limits, protection_data
+from rtsim.protection.monitor import WATCHED, LimitLevels, MarginHistory, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 CALM = Sensors(
@@ -165,11 +165,11 @@ def test_history_equals_the_monitor_in_flight(monitor):
         names = ("clear", "caution", "warning", "exceedance")
         assert list(got.levels.values()) == [names[int(level)] for level in history.levels[k]]
         assert got.normalized_distance == history.normalized_distance[k]
-    assert history.summary()["stall_attitude"]["worst"] == pytest.approx(
+    assert history.limits["stall_attitude"]["worst_margin"] == pytest.approx(
         85.0 - to_kt(load_corridor("flight").low_speed(deg(50.0)))
     )
-    assert history.summary()["stall_attitude"]["outside_s"] > 0.5
-    assert history.summary()["stall_attitude"]["level"] == 3.0
+    assert history.limits["stall_attitude"]["outside_s"] > 0.5
+    assert history.levels[:, kernels.KIND.stall_attitude].max() == 3.0
 
 
 def test_sensor_values_keep_the_order_of_the_sensors():
@@ -182,7 +182,38 @@ def test_sensor_values_keep_the_order_of_the_sensors():
 
 def test_watched_names_are_the_limits_and_the_time():
     assert WATCHED[: len(LIMIT_KINDS)] == LIMIT_KINDS
-    assert len(WATCHED) == kernels.KIND_COUNT
+    assert len(WATCHED) == kernels.KIND.size
+
+
+def test_limits_are_the_numbers_of_the_data_in_si():
+    limits, data = load_limits(), protection_data()["limits"]
+    assert to_deg(limits.flapping) == pytest.approx(data["flapping_deg"])
+    assert to_deg(limits.nacelle_rate) == pytest.approx(data["nacelle_rate_deg_s"])
+    assert to_kt(limits.plant_guard) == pytest.approx(data["plant_guard_kt"])
+    assert limits.load_factor_min == data["load_factor_min"]
+    assert limits.torque.takeoff == pytest.approx(data["mast_torque_takeoff_inlb"] * INCH_POUND)
+    assert (limits.sink.floor, limits.sink.time) == (data["sink_rate_m_s"], data["sink_time_s"])
+    assert set(WATCHED) <= set(protection_data()["levels"])
+
+
+def test_what_is_watched_in_pieces_is_watched_as_a_whole(monitor):
+    """Levels and least margins do not depend on how many rows are looked at together."""
+    random = np.random.default_rng(2)
+    sensors = np.tile(sensor_array(CALM), (900, 1))
+    sensors[:, SENSOR.flapping] = deg(10.0 + 3.0 * np.sin(np.arange(900) / 90.0))
+    sensors[:, SENSOR.load_factor] = 1.0 + random.standard_normal(900)
+    ahead = np.full(900, 6.0)
+    whole, pieces = LimitLevels(monitor.tables, 0.004), LimitLevels(monitor.tables, 0.004)
+    margins, levels = whole.look(sensors, ahead)
+    parts = [pieces.look(sensors[k : k + 7], ahead[k : k + 7]) for k in range(0, 900, 7)]
+    assert np.array_equal(np.concatenate([part[0] for part in parts]), margins)
+    assert np.array_equal(np.concatenate([part[1] for part in parts]), levels)
+    assert levels[:, kernels.KIND.flap_stop].max() == 3.0
+    found = whole.summary()
+    assert found == pieces.summary()
+    assert found["flap_stop"]["worst_margin"] == pytest.approx(-1.0, abs=1e-3)
+    assert found["flap_stop"]["outside_s"] == np.count_nonzero(margins[:, kernels.KIND.flap_stop] < 0.0) * 0.004
+    assert "downstop_gate" not in found
 
 
 @pytest.mark.parametrize(
@@ -196,8 +227,8 @@ def test_severity(depth, duration, lost, word):
 
 def history_of(margin, predicted):
     time = 0.1 * np.arange(len(margin))
-    margins = np.full((len(margin), kernels.KIND_COUNT), 10.0)
-    margins[:, kernels.KIND_STALL] = margin
+    margins = np.full((len(margin), kernels.KIND.size), 10.0)
+    margins[:, kernels.KIND.stall_attitude] = margin
     zeros = np.zeros(len(margin))
     return MarginHistory(time, margins, margins * 0.0, zeros, np.asarray(predicted, float), zeros)
 
