@@ -58,6 +58,9 @@ class Metric:
     """Name among the figures of a search where it is another."""
     objective: str = ""
     """Name under which a search can minimize it; empty where it cannot."""
+    campaign: tuple[str, ...] = ()
+    """Statistics in a campaign's report: ``p50`` or another quantile, ``max``, ``rms``; ``p50 outside`` is that of the
+    flights that left the corridor."""
     kind: type = float
     """What it is shown as: float, int or bool."""
 
@@ -80,14 +83,16 @@ METRICS = (
     Metric("worst_margin_kt", "kn", "smallest corridor margin, negative outside", lambda s: s.margin_least,
            flight="corridor.worst_margin_kt"),
     Metric("time_outside_s", "s", "time with a corridor margin below -0.5 kn", lambda s: s.outside_frames * s.dt,
-           flight="corridor.time_outside_s"),
-    Metric("depth_kt", "kn", "deepest airspeed outside the corridor", lambda s: max(-s.margin_least, 0.0), (TRIAL,)),
+           flight="corridor.time_outside_s", campaign=("p50 outside",)),
+    Metric("depth_kt", "kn", "deepest airspeed outside the corridor", lambda s: max(-s.margin_least, 0.0), (TRIAL,),
+           campaign=("p50 outside", "p95 outside")),
     Metric("area_kt_s", "kn s", "integral of the airspeed outside the corridor", lambda s: s.area, (TRIAL,)),
     Metric("mean_margin_kt", "kn", "mean corridor margin", lambda s: s.margin / s.frames, (SEARCH,)),
     Metric("proximity_kt", "kn", "smallest corridor margin, negated", lambda s: -s.margin_least, (),
            objective="corridor_proximity"),
     Metric("flapping_peak_deg", "deg", "largest cyclic flapping relative to the mast, √(b1c² + b1s²)",
-           lambda s: s.flapping_peak, flight="flapping_deg.peak", objective="flapping_peak"),
+           lambda s: s.flapping_peak, flight="flapping_deg.peak", objective="flapping_peak",
+           campaign=("max",)),
     Metric("flapping_peak_time_s", "s", "time of the largest flapping", lambda s: s.flapping_peak_time,
            (FLIGHT, SEARCH), flight="flapping_deg.peak_time_s"),
     Metric("flapping_late_peak_deg", "deg", "largest flapping from 30 s on; null for shorter flights",
@@ -116,7 +121,8 @@ METRICS = (
            objective="altitude_excursion"),
     Metric("altitude_final_m", "m", "altitude of the last frame", lambda s: s.altitude, (FLIGHT,),
            flight="altitude_m.final"),
-    Metric("height_lost_m", "m", "largest height below the altitude to hold", lambda s: s.height_lost, (TRIAL,)),
+    Metric("height_lost_m", "m", "largest height below the altitude to hold", lambda s: s.height_lost, (TRIAL,),
+           campaign=("p90", "max")),
     Metric("height_gained_m", "m", "largest height above the altitude to hold", lambda s: s.height_gained, (TRIAL,)),
     Metric("pitch_min_deg", "deg", "smallest pitch attitude", lambda s: s.pitch_least, (FLIGHT, SEARCH),
            flight="pitch_deg.min"),
@@ -151,7 +157,8 @@ METRICS = (
            search="lever.path"),
     Metric("controls_on_stop_frames", "", "frames with stick, lever, cyclic or elevator on a stop",
            lambda s: s.stop_frames, (FLIGHT, SEARCH), kind=int),
-    Metric("torque_ratio_peak", "", "largest mast torque as a share of its limit", lambda s: s.torque_share, (TRIAL,)),
+    Metric("torque_ratio_peak", "", "largest mast torque as a share of its limit", lambda s: s.torque_share, (TRIAL,),
+           campaign=("max",)),
     Metric("torque_over_s", "s", "time with mast torque above 1.02 of its limit", lambda s: s.torque_over, (TRIAL,)),
     Metric("mast_torque_max_inlb", "in lb", "largest torque of one mast", lambda s: s.torque, (SEARCH,)),
     Metric("engine_power_max_shp", "shp", "largest engine power", lambda s: s.power_largest, (SEARCH,)),
@@ -166,9 +173,9 @@ METRICS = (
     Metric("other_active_s", "s", "time the law acted for another limit (torque, flapping, pitch, sink)",
            lambda s: s.other_active, (TRIAL,)),
     Metric("stick_authority_rms", "", "RMS of what the law added to the stick, -1 to 1",
-           lambda s: math.sqrt(s.share_stick_squares / s.frames), (TRIAL,)),
+           lambda s: math.sqrt(s.share_stick_squares / s.frames), (TRIAL,), campaign=("rms",)),
     Metric("lever_authority_rms", "", "RMS of what the law added to the lever, 0 to 1",
-           lambda s: math.sqrt(s.share_lever_squares / s.frames), (TRIAL,)),
+           lambda s: math.sqrt(s.share_lever_squares / s.frames), (TRIAL,), campaign=("rms",)),
     Metric("nacelle_removed_deg", "deg", "nacelle motion the law took from or added to what was asked",
            lambda s: s.nacelle_removed, (TRIAL,)),
     Metric("stick_step_max", "", "largest change of the law's share of the stick from frame to frame, -1 to 1",

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,6 +30,7 @@ from rtsim.measures.metrics import (
 from rtsim.programme import Programme
 from rtsim.units import KNOT, deg, kt
 
+ROOT = Path(__file__).resolve().parents[2]
 DT = 0.004
 HOLD = Programme.hold(airspeed=0.0, nacelle_angle=deg(90.0), altitude=100.0)
 KEYS = {
@@ -360,6 +366,92 @@ def test_all_views_show_the_same_numbers_under_their_names() -> None:
         _ = flight.beauty
     assert search == FlightFigures(numbers.copy())
     assert search != FlightFigures(numbers + 1.0)
+
+
+TOY = """
+import importlib.util, json, sys
+import numpy as np
+
+def edited(name, path):
+    spec = importlib.util.spec_from_file_location(name, path)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+
+edited("rtsim.measures.metric_kernels", sys.argv[1])
+from docs.tables import flight_metrics_table, trial_metrics_table
+from rtsim.frame import COLUMN, SIGNAL_COUNT
+from rtsim.measures import metrics
+from rtsim.programme import Programme
+from scenarios.campaign.chunks import LawVariant
+from scenarios.campaign.spec import parse_campaign
+from scenarios.campaign.verdict import Flights, summarize
+from scenarios.files.loader import parse_scenario
+
+scenario, problems = parse_scenario(SCENARIO, file="mine.toml")
+campaign, _ = parse_campaign(CAMPAIGN, file="mine.toml")
+rows = np.zeros((5, SIGNAL_COUNT))
+rows[:, COLUMN.airspeed_kt] = [1.0, 3.0, 7.0, 2.0, 0.0]
+numbers = metrics.measured(rows, Programme.hold(airspeed=0.0, nacelle_angle=0.0, altitude=100.0), 0.004)
+flights = Flights(campaign, (LawVariant("full"), LawVariant("off")), (np.tile(numbers, (3, 2, 1)),), (3,))
+print(json.dumps({
+    "problems": [str(item) for item in problems],
+    "flight": metrics.FlightMetrics(numbers).asdict()["toy_kt"],
+    "unit": metrics.metric_unit("toy_kt"),
+    "trial": metrics.TrialMetrics(numbers)["toy_kt"],
+    "search": metrics.FlightFigures(numbers).asdict()["toy_kt"],
+    "objective": metrics.objective_value(metrics.FlightFigures(numbers), "toy"),
+    "words": metrics.TRIAL_METRICS["toy_kt"],
+    "campaign": summarize(flights, 0)["laws"][0]["toy_kt"],
+    "docs": all("| `toy_kt` | a toy [kn] |" in table() for table in (flight_metrics_table, trial_metrics_table)),
+}))
+"""
+TOY_SCENARIO = """
+format = 1
+name = "toy"
+title = "A hold"
+description = "For a toy."
+duration_s = 5.0
+[start]
+condition = "hover"
+[trial]
+kind = "nominal"
+[[trial.expect]]
+name = "toy"
+metric = "toy_kt"
+max = 8.0
+[[expect]]
+name = "toy"
+metric = "toy_kt"
+max = 8.0
+"""
+
+
+def test_a_new_metric_needs_one_file_alone(tmp_path: Path) -> None:
+    """A toy is measured, demanded, shown, counted, minimized and described wherever metrics are."""
+    text = (ROOT / "rtsim/measures/metric_kernels.py").read_text(encoding="utf-8")
+    for place, line in (
+        ("METRICS = (\n", "Metric('toy_kt', 'kn', 'a toy', lambda s: s.toy, objective='toy', campaign=('max',)),\n"),
+        ("SUM = Places(\n", "'toy',\n"),
+        ("    first = sums[SUM.frames] == 0.0\n", "    sums[SUM.toy] = max(sums[SUM.toy], row[COLUMN.airspeed_kt])\n"),
+    ):
+        assert text.count(place) == 1
+        text = text.replace(place, place + line)
+    (tmp_path / "metric_kernels.py").write_text(text, encoding="utf-8")
+    campaign = (ROOT / "scenarios/campaign/library/nominal.toml").read_text(encoding="utf-8")
+    one_class = campaign[: campaign.index("[[classes]]", campaign.index("[[classes]]") + 1)]
+    program = f"SCENARIO = {TOY_SCENARIO!r}\nCAMPAIGN = {one_class!r}\n{TOY}"
+    (tmp_path / "toy.py").write_text(program, encoding="utf-8")
+    ended = subprocess.run(
+        [sys.executable, str(tmp_path / "toy.py"), str(tmp_path / "metric_kernels.py")],
+        capture_output=True, text=True, cwd=ROOT, check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)},
+    )  # fmt: skip
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads(ended.stdout)
+    assert found["problems"] == []
+    assert [found[view] for view in ("flight", "trial", "search", "objective")] == [7.0] * 4
+    assert (found["unit"], found["words"], found["campaign"]) == ("kn", "a toy [kn]", {"max": 7.0})
+    assert found["docs"]
 
 
 def test_no_two_metrics_have_one_name() -> None:
