@@ -15,6 +15,7 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from rtsim.aircraft.profile import xv15_profile
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.frame import FloatArray
 from rtsim.loop.setup import FlightSetup
@@ -27,7 +28,7 @@ from rtsim.optimization.paths import PATH_NAMES, centre_line, centre_line_variab
 from rtsim.optimization.problem import ConversionProblem
 from rtsim.optimization.search import SearchResult, run_search
 from rtsim.optimization.spec import SearchSpec, checked_spec, spec_like
-from rtsim.pilot.weights import DisplaySettings, PilotSettings
+from rtsim.pilot.weights import DisplaySettings, PilotSettings, pilot_settings
 from rtsim.programme import Programme
 from rtsim.units import deg
 from scenarios.reproduction.drawing import BLUE, GREEN, ORANGE, PURPLE, RED, STYLE, draw_corridor
@@ -237,7 +238,7 @@ def displays(settings: PilotSettings, names: tuple[str, ...], key: str, factor: 
 
 def pilots(paths: dict[str, ConversionPath]) -> None:
     """The same paths by other pilots."""
-    plain = PilotSettings()
+    plain = pilot_settings(xv15_profile())
     path_displays = ("airspeed", "altitude", "climb_rate")
     variants: dict[str, PilotSettings | None] = {
         "delay 0.10 s": dataclasses.replace(plain, delay=0.10),

@@ -26,12 +26,13 @@ from rtsim.aids.aids_kernels import (
     TRIM_BIAS,
     AidTables,
 )
-from rtsim.aircraft.variables import FLAP_INPUTS
+from rtsim.aircraft.variables import FLAP_INPUTS, position
 from rtsim.choices import AidName, SwitchName
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
+from rtsim.lpv.reduction import settled
 from rtsim.units import deg
 
 SWITCHES: dict[SwitchName, int] = {
@@ -56,53 +57,43 @@ def design_aids(database: Database) -> AidTables:
     Args:
         database: The LPV database.
     """
-    names = [variable.name for variable in database.states]
-    inputs = [variable.name for variable in database.inputs]
-    slow = [names.index(name) for name in RIGID_BODY]
-    fast = [i for i, name in enumerate(names) if name not in (*RIGID_BODY, "altitude")]
-    level = database.level_layer
-    stick, lever = inputs.index("stick"), inputs.index("lever")
-    reduced_a, reduced_b = _settled(database.A[level], database.B[level], slow, fast)
-    pitch = database.x_ref[level, ..., names.index("pitch")]
+    # A database of one's own may lack flap inputs: the flaps stay where its schedule has them.
+    flaps = [name for name in FLAP_INPUTS if position(database.inputs, name) >= 0]
+    model = settled(database, keep=RIGID_BODY, inputs=("stick", "lever", *flaps), purpose="the aids")
+    level, reduced_a, reduced_b = database.level_layer, model.a, model.b
+    u, w, q, pitch_place = range(len(RIGID_BODY))
+    stick, lever, *flap_columns = range(len(model.inputs))
+    pitch = database.x_ref[level, ..., model.kept[pitch_place]]
     maps = np.zeros((MAP_COUNT, len(database.airspeed), len(database.nacelle)))
-    maps[MAP_STICK] = database.u_ref[level, ..., stick]
-    maps[MAP_LEVER] = database.u_ref[level, ..., lever]
-    maps[MAP_PITCH_SENSITIVITY] = reduced_b[..., 2, stick]
-    maps[MAP_PITCH_DAMPING] = reduced_a[..., 2, 2]
-    maps[MAP_LEVER_LIFT] = np.sin(pitch) * reduced_b[..., 0, lever] - np.cos(pitch) * reduced_b[..., 1, lever]
-    maps[MAP_LEVER_THRUST] = np.cos(pitch) * reduced_b[..., 0, lever] + np.sin(pitch) * reduced_b[..., 1, lever]
-    for k, name in enumerate(FLAP_INPUTS):
-        if name not in inputs:  # a database of one's own: the flaps stay where its schedule has them
-            continue
-        maps[MAP_STICK_FLAPS + k] = -reduced_b[..., 2, inputs.index(name)] / reduced_b[..., 2, stick]
+    maps[MAP_STICK] = database.u_ref[level, ..., model.inputs[stick]]
+    maps[MAP_LEVER] = database.u_ref[level, ..., model.inputs[lever]]
+    maps[MAP_PITCH_SENSITIVITY] = reduced_b[..., q, stick]
+    maps[MAP_PITCH_DAMPING] = reduced_a[..., q, q]
+    maps[MAP_LEVER_LIFT] = np.sin(pitch) * reduced_b[..., u, lever] - np.cos(pitch) * reduced_b[..., w, lever]
+    maps[MAP_LEVER_THRUST] = np.cos(pitch) * reduced_b[..., u, lever] + np.sin(pitch) * reduced_b[..., w, lever]
+    for name, column in zip(flaps, flap_columns, strict=True):
+        place = MAP_STICK_FLAPS + FLAP_INPUTS.index(name)
+        maps[place] = -reduced_b[..., q, column] / reduced_b[..., q, stick]
+    part = database.profile.aids
+    blend = part.numbers("blend_nacelle_deg", low=0.0, high=95.0, count=2, rises=True)
     return packed(
         AidTables(
             airspeed=database.airspeed,
             nacelle=database.nacelle,
             maps=maps,
-            schedule_time=2.0,
-            damping=1.5,
-            attitude_frequency=1.5,
-            attitude_damping=0.8,
-            authority=0.5,
-            rate_command=deg(10.0),
-            dead_zone=0.03,
-            altitude_frequency=0.5,
-            airspeed_frequency=0.25,
-            integral_time=10.0,
-            fade_time=1.0,
-            blend=(deg(30.0), deg(60.0)),
+            schedule_time=part.number("schedule_time_s", low=0.01, high=100.0),
+            damping=part.number("damping_per_s", low=0.0, high=20.0),
+            attitude_frequency=part.number("attitude_frequency_rad_s", low=0.01, high=20.0),
+            attitude_damping=part.number("attitude_damping", low=0.0, high=5.0),
+            authority=part.number("authority", low=0.0, high=1.0),
+            rate_command=deg(part.number("rate_command_deg_s", low=0.1, high=100.0)),
+            dead_zone=part.number("dead_zone", low=0.0, high=0.5),
+            altitude_frequency=part.number("altitude_frequency_rad_s", low=0.01, high=10.0),
+            airspeed_frequency=part.number("airspeed_frequency_rad_s", low=0.01, high=10.0),
+            integral_time=part.number("integral_time_s", low=0.1, high=1000.0),
+            fade_time=part.number("fade_time_s", low=0.0, high=100.0),
+            blend=(deg(blend[0]), deg(blend[1])),
         )
-    )
-
-
-def _settled(A: FloatArray, B: FloatArray, slow: list[int], fast: list[int]) -> tuple[FloatArray, FloatArray]:
-    """Residualise the fast states at all points at once; leading axes are the grid's."""
-    all_fast, all_slow = A[..., fast, :], A[..., slow, :]
-    inner, back = all_fast[..., fast], all_slow[..., fast]
-    return (
-        all_slow[..., slow] - back @ np.linalg.solve(inner, all_fast[..., slow]),
-        B[..., slow, :] - back @ np.linalg.solve(inner, B[..., fast, :]),
     )
 
 

@@ -1,10 +1,34 @@
-"""Names, units and order of the states, inputs and outputs of the symmetric-plane XV-15."""
+"""States, inputs and outputs as data: name, unit, meaning and role; and those of the symmetric-plane XV-15.
+
+Whoever needs a group of them selects by role, never by "all but" and never by where they stand.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
+from rtsim.errors import InputError
 from rtsim.places import Places
+
+ROLES: dict[str, dict[str, str]] = {
+    "state": {
+        "rigid": "motion of the rigid body",
+        "navigation": "where it is; acts on nothing",
+        "rotor": "blades; they settle within a tenth of a second",
+        "inflow": "air through the rotors; it settles as fast",
+        "actuator": "moves towards what a control asks for",
+    },
+    "input": {
+        "pilot": "the pilot's hands",
+        "nacelle": "driven by the motion of the nacelles",
+        "gust": "motion of the air",
+        "flap": "flaps less their schedule",
+        "drive": "rotor speed less the one that is held",
+    },
+    "output": {"rotor": "loads and motion of the rotors", "body": "what the whole aircraft does"},
+}
+"""What a state, an input or an output can be, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,56 +41,152 @@ class Variable:
     """SI unit; empty where dimensionless."""
     description: str
     """One sentence for people."""
+    role: str = ""
+    """One of ``ROLES``; empty only until a database gives the known names their known roles."""
 
 
 SCHEDULING_SPEED = 4.5
 """Added along the horizon before an angle of attack is taken for scheduling or output: defined in hover too [m/s]."""
 
 STATES: tuple[Variable, ...] = (
-    Variable("u", "m/s", "Air-relative velocity along the body x axis (forward)"),
-    Variable("w", "m/s", "Air-relative velocity along the body z axis (down)"),
-    Variable("q", "rad/s", "Body pitch rate, nose up positive"),
-    Variable("pitch", "rad", "Pitch attitude, nose up positive"),
-    Variable("altitude", "m", "Height above the ground"),
-    Variable("coning", "rad", "Coning angle, precone included"),
-    Variable("coning_rate", "rad/s", "Rate of the coning angle"),
-    Variable("flap_1c", "rad", "Cosine gimbal flapping; positive tilts the disc forward"),
-    Variable("flap_1c_rate", "rad/s", "Rate of the cosine gimbal flapping"),
-    Variable("flap_1s", "rad", "Sine gimbal flapping"),
-    Variable("flap_1s_rate", "rad/s", "Rate of the sine gimbal flapping"),
-    Variable("inflow_0", "", "Mean induced velocity over tip speed"),
-    Variable("inflow_1c", "", "Fore-aft gradient of the induced velocity over tip speed"),
-    Variable("inflow_1s", "", "Lateral gradient of the induced velocity over tip speed"),
-    Variable("collective_75", "rad", "Collective pitch at 75 % radius (after its actuator)"),
-    Variable("cyclic_1s", "rad", "Longitudinal cyclic pitch (after its actuator); negative tilts the disc forward"),
-    Variable("elevator", "rad", "Elevator (after its actuator), trailing edge down positive"),
+    Variable("u", "m/s", "Air-relative velocity along the body x axis (forward)", "rigid"),
+    Variable("w", "m/s", "Air-relative velocity along the body z axis (down)", "rigid"),
+    Variable("q", "rad/s", "Body pitch rate, nose up positive", "rigid"),
+    Variable("pitch", "rad", "Pitch attitude, nose up positive", "rigid"),
+    Variable("altitude", "m", "Height above the ground", "navigation"),
+    Variable("coning", "rad", "Coning angle, precone included", "rotor"),
+    Variable("coning_rate", "rad/s", "Rate of the coning angle", "rotor"),
+    Variable("flap_1c", "rad", "Cosine gimbal flapping; positive tilts the disc forward", "rotor"),
+    Variable("flap_1c_rate", "rad/s", "Rate of the cosine gimbal flapping", "rotor"),
+    Variable("flap_1s", "rad", "Sine gimbal flapping", "rotor"),
+    Variable("flap_1s_rate", "rad/s", "Rate of the sine gimbal flapping", "rotor"),
+    Variable("inflow_0", "", "Mean induced velocity over tip speed", "inflow"),
+    Variable("inflow_1c", "", "Fore-aft gradient of the induced velocity over tip speed", "inflow"),
+    Variable("inflow_1s", "", "Lateral gradient of the induced velocity over tip speed", "inflow"),
+    Variable("collective_75", "rad", "Collective pitch at 75 % radius (after its actuator)", "actuator"),
+    Variable(
+        "cyclic_1s",
+        "rad",
+        "Longitudinal cyclic pitch (after its actuator); negative tilts the disc forward",
+        "actuator",
+    ),
+    Variable("elevator", "rad", "Elevator (after its actuator), trailing edge down positive", "actuator"),
 )
 INPUTS: tuple[Variable, ...] = (
-    Variable("stick", "", "Longitudinal stick, -1 aft to 1 forward"),
-    Variable("lever", "", "Power lever, 0 to 1"),
-    Variable("nacelle_rate", "rad/s", "Rate of the nacelle angle"),
-    Variable("nacelle_acceleration", "rad/s^2", "Angular acceleration of the nacelles"),
-    Variable("gust_u", "m/s", "Gust added to the air-relative velocity along body x"),
-    Variable("gust_w", "m/s", "Gust added to the air-relative velocity along body z"),
-    Variable("gust_q", "rad/s", "Gust added to the air-relative pitch rate"),
-    Variable("flap_0_20", "rad", "Flap deflection between 0 and 20 deg, less that of the flap schedule"),
-    Variable("flap_20_40", "rad", "Flap deflection between 20 and 40 deg, less that of the flap schedule"),
-    Variable("flap_40_75", "rad", "Flap deflection between 40 and 75 deg, less that of the flap schedule"),
-    Variable("rotor_speed", "rad/s", "Rotor speed less the one that is held"),
+    Variable("stick", "", "Longitudinal stick, -1 aft to 1 forward", "pilot"),
+    Variable("lever", "", "Power lever, 0 to 1", "pilot"),
+    Variable("nacelle_rate", "rad/s", "Rate of the nacelle angle", "nacelle"),
+    Variable("nacelle_acceleration", "rad/s^2", "Angular acceleration of the nacelles", "nacelle"),
+    Variable("gust_u", "m/s", "Gust added to the air-relative velocity along body x", "gust"),
+    Variable("gust_w", "m/s", "Gust added to the air-relative velocity along body z", "gust"),
+    Variable("gust_q", "rad/s", "Gust added to the air-relative pitch rate", "gust"),
+    Variable("flap_0_20", "rad", "Flap deflection between 0 and 20 deg, less that of the flap schedule", "flap"),
+    Variable("flap_20_40", "rad", "Flap deflection between 20 and 40 deg, less that of the flap schedule", "flap"),
+    Variable("flap_40_75", "rad", "Flap deflection between 40 and 75 deg, less that of the flap schedule", "flap"),
+    Variable("rotor_speed", "rad/s", "Rotor speed less the one that is held", "drive"),
 )
 OUTPUTS: tuple[Variable, ...] = (
-    Variable("thrust", "N", "Thrust of one rotor along its mast"),
-    Variable("torque", "N m", "Torque of one mast"),
-    Variable("power", "W", "Shaft power of both rotors"),
-    Variable("load_factor", "", "Normal load factor: specific force along -z body over g"),
-    Variable("airspeed_rate", "m/s^2", "Rate of the horizontal airspeed"),
-    Variable("wing_angle_of_attack", "rad", "Angle of attack at which the wing tables are entered"),
-    Variable("flapping", "rad", "Magnitude of the gimbal flapping relative to the mast"),
+    Variable("thrust", "N", "Thrust of one rotor along its mast", "rotor"),
+    Variable("torque", "N m", "Torque of one mast", "rotor"),
+    Variable("power", "W", "Shaft power of both rotors", "rotor"),
+    Variable("load_factor", "", "Normal load factor: specific force along -z body over g", "body"),
+    Variable("airspeed_rate", "m/s^2", "Rate of the horizontal airspeed", "body"),
+    Variable("wing_angle_of_attack", "rad", "Angle of attack at which the wing tables are entered", "body"),
+    Variable("flapping", "rad", "Magnitude of the gimbal flapping relative to the mast", "rotor"),
 )
 
-FLAP_INPUTS = ("flap_0_20", "flap_20_40", "flap_40_75")
+
+def of_role(variables: Sequence[Variable], *roles: str) -> tuple[int, ...]:
+    """Positions of the variables that have one of some roles.
+
+    Args:
+        variables: The states, inputs or outputs of an aircraft.
+        roles: Roles sought.
+    """
+    return tuple(place for place, variable in enumerate(variables) if variable.role in roles)
+
+
+def position(variables: Sequence[Variable], name: str) -> int:
+    """Position of a variable by name; -1 where there is none.
+
+    Args:
+        variables: The states, inputs or outputs of an aircraft.
+        name: The variable sought.
+    """
+    return next((place for place, variable in enumerate(variables) if variable.name == name), -1)
+
+
+def required_position(variables: Sequence[Variable], name: str, purpose: str) -> int:
+    """Position of a variable that must be there.
+
+    Args:
+        variables: The states, inputs or outputs of an aircraft.
+        name: The variable sought.
+        purpose: What it is needed for, for the message.
+
+    Raises:
+        InputError: There is no variable of that name.
+    """
+    index = position(variables, name)
+    if index < 0:
+        raise InputError(
+            f"the database has no variable '{name}', which {purpose} needs",
+            key="name",
+            allowed=", ".join(variable.name for variable in variables),
+            mend=f"rename the variable that means '{name}'",
+        )
+    return index
+
+
+def with_roles(kind: str, variables: Sequence[Variable]) -> tuple[Variable, ...]:
+    """Give variables without a role that of the known name.
+
+    Args:
+        kind: ``state``, ``input`` or ``output``.
+        variables: The variables.
+
+    Raises:
+        InputError: A name is not known and has no role, or a role does not exist.
+    """
+    allowed = ", ".join(ROLES[kind])
+    found = []
+    for variable in variables:
+        role = variable.role or _KNOWN_ROLES[kind].get(variable.name, "")
+        if role not in ROLES[kind]:
+            problem = f"the {kind} '{variable.name}' has a role that does not exist"
+            if not role:
+                problem = f"the {kind} '{variable.name}' is not known and says no role"
+            raise InputError(
+                problem, key=f"{kind}_role", value=role or None, allowed=allowed,
+                mend=f"say what it is in {kind}_role (docs/lpv.md)",
+            )  # fmt: skip
+        found.append(variable if variable.role else replace(variable, role=role))
+    return tuple(found)
+
+
+_KNOWN_ROLES = {
+    kind: {variable.name: variable.role for variable in variables}
+    for kind, variables in (("state", STATES), ("input", INPUTS), ("output", OUTPUTS))
+}
+
+
+def _names(variables: Sequence[Variable], *roles: str) -> tuple[str, ...]:
+    return tuple(variables[place].name for place in of_role(variables, *roles))
+
+
+SCHEDULING_STATES = ("u", "w", "pitch")
+"""States that every database must have: airspeed and angle of attack are computed from them."""
+RIGID_BODY_STATES = _names(STATES, "rigid", "navigation")
+"""States that the stitched forms need besides: their gravity, Coriolis and kinematic terms are nonlinear."""
+NACELLE_INPUTS = _names(INPUTS, "nacelle")
+"""Inputs that the step fills from the nacelle path where the database has them."""
+GUST_INPUTS = ("gust_u", "gust_w")
+"""Inputs that add to u and w in the aerodynamics, and so in the scheduling of the forms where these stand alone."""
+FLAP_INPUTS = _names(INPUTS, "flap")
 """Inputs that move the flaps: one for each interval between published settings, in which the aerodynamics are linear
 in the deflection. Together they are the flap deflection less that of the schedule."""
+AUXILIARY_INPUTS = _names(INPUTS, "flap", "drive")
+"""Inputs that are zero while flaps and rotor speed are where schedule and governor have them."""
 
 STATE = Places(*(variable.name for variable in STATES))
 """Index of a state by name, usable in compiled kernels."""

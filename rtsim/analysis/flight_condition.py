@@ -17,13 +17,11 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from rtsim.aircraft import Condition, TrimPoint, Variable
+    from rtsim.aircraft.profile import AircraftProfile
     from rtsim.choices import OuterLoop
     from rtsim.lpv import LpvAircraft
 
     FloatArray = npt.NDArray[np.float64]
-
-ENGINE_EFFICIENCY = 0.93
-"""Shaft power of both rotors over engine power."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,15 +65,27 @@ _LIMITS: tuple[tuple[str, float, float, str], ...] = (
 )
 
 
-_STOPS: tuple[tuple[str, float, float, str], ...] = (
-    ("stick_in", -4.8, 4.8, "in"),
-    ("lever_fraction", 0.0, 1.0, ""),
-    ("elevator_deg", -20.0, 20.0, "deg"),
-    ("cyclic_deg", -10.06, 10.06, "deg"),
-    ("flapping_deg", 0.0, 12.0, "deg"),
-    ("engine_power_shp", 0.0, 3604.0, "shp"),
-)
-"""Stops of controls and gimbal, and what both engines give for two minutes (docs/model.md)."""
+def _stops(profile: AircraftProfile) -> tuple[tuple[str, float, float, str], ...]:
+    """Stops of controls and gimbal, and what all engines give at most (docs/model.md): key, range, unit."""
+    from rtsim.aircraft.controls import control_tables
+    from rtsim.protection import load_limits
+    from rtsim.systems.settings import all_engines_power
+    from rtsim.units import HORSEPOWER, to_deg
+
+    controls, travel = control_tables(profile), _stick_travel(profile)
+    elevator, cyclic = to_deg(controls.elevator_limit), to_deg(controls.cyclic_limit)
+    return (
+        ("stick_in", -travel, travel, "in"),
+        ("lever_fraction", 0.0, 1.0, ""),
+        ("elevator_deg", -elevator, elevator, "deg"),
+        ("cyclic_deg", -cyclic, cyclic, "deg"),
+        ("flapping_deg", 0.0, to_deg(load_limits(profile).flapping), "deg"),
+        ("engine_power_shp", 0.0, all_engines_power(profile) / HORSEPOWER, "shp"),
+    )
+
+
+def _stick_travel(profile: AircraftProfile) -> float:
+    return profile.controls.number("stick_half_travel_in", low=0.1, high=100.0)
 
 
 def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
@@ -181,6 +191,7 @@ def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
         The result by JSON key, and the trim.
     """
     from rtsim.aircraft import INPUTS, OUTPUTS, STATES
+    from rtsim.aircraft.profile import xv15_profile
     from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.units import to_deg, to_rpm
@@ -194,7 +205,8 @@ def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
         flap = float(flap_schedule(tables.controls, condition.airspeed, condition.nacelle_angle))
     rotor_speed = tables.configuration.rotor_speed if condition.rotor_speed is None else condition.rotor_speed
     values = _named(point, STATES, INPUTS, OUTPUTS)
-    return _trim_result(request, values, to_deg(flap), to_rpm(float(rotor_speed)), point.converged), point
+    configuration = (to_deg(flap), to_rpm(float(rotor_speed)))
+    return _trim_result(request, xv15_profile(), values, configuration, point.converged), point
 
 
 def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
@@ -217,7 +229,8 @@ def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     database = aircraft.database
     flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
     values = _named(point, database.states, database.inputs, database.outputs)
-    return _trim_result(request, values, to_deg(flap), to_rpm(database.rotor_speed), point.converged), point
+    configuration = (to_deg(flap), to_rpm(database.rotor_speed))
+    return _trim_result(request, database.profile, values, configuration, point.converged), point
 
 
 def solvable(request: Request) -> Request:
@@ -230,11 +243,20 @@ def solvable(request: Request) -> Request:
         The request, or the same for the nonlinear model.
 
     Raises:
-        InputError: The condition is outside the database.
+        InputError: The condition is outside the database, or the aircraft has no nonlinear model that could be asked.
     """
     from rtsim.units import deg, kt
 
-    if request.solves_nonlinear or request.database is not None:
+    if request.database is not None:
+        profile = _lpv(request).database.profile
+        if request.solves_nonlinear and not profile.is_xv15:
+            raise InputError(
+                f"there is no nonlinear model of the {profile.name}",
+                key="--nonlinear",
+                mend="leave it out, and flaps, rotor speed, weight, altitude and acceleration too",
+            )
+        return request
+    if request.solves_nonlinear:
         return request
     if _lpv(request).trim(airspeed=kt(request.airspeed_kt), nacelle=deg(request.nacelle_deg)).converged:
         return request
@@ -260,21 +282,27 @@ def _named(
 
 
 def _trim_result(
-    request: Request, values: dict[str, float], flap_deg: float, rotor_rpm: float, converged: bool
+    request: Request,
+    profile: AircraftProfile,
+    values: dict[str, float],
+    configuration: tuple[float, float],
+    converged: bool,
 ) -> dict[str, Any]:
     from rtsim.corridor import load_corridor
-    from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, STICK_HALF_TRAVEL_IN, deg, kt, to_deg
+    from rtsim.faults.fault import transmission_efficiency
+    from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, to_deg
 
+    flap_deg, rotor_rpm = configuration
     solved = {
         "pitch_deg": to_deg(values["pitch"]),
-        "stick_in": values["stick"] * STICK_HALF_TRAVEL_IN,
+        "stick_in": values["stick"] * _stick_travel(profile),
         "elevator_deg": to_deg(values["elevator"]),
         "cyclic_deg": to_deg(values["cyclic_1s"]),
         "collective_75_deg": to_deg(values["collective_75"]),
         "lever_fraction": values["lever"],
         "thrust_per_rotor_lb": values["thrust"] / POUND_FORCE,
         "power_shp": values["power"] / HORSEPOWER,
-        "engine_power_shp": values["power"] / HORSEPOWER / ENGINE_EFFICIENCY,
+        "engine_power_shp": values["power"] / HORSEPOWER / transmission_efficiency(profile),
         "mast_torque_inlb": values["torque"] / INCH_POUND,
         "flapping_deg": to_deg(math.hypot(values["flap_1c"], values["flap_1s"])),
     }
@@ -286,16 +314,16 @@ def _trim_result(
         # where nothing was solved, the last iterate is no answer
         **(solved if converged else dict.fromkeys(solved)),
         "converged": converged,
-        "beyond_limits": _beyond_limits(solved) if converged else [],
-        "inside_corridor": load_corridor("design").inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
+        "beyond_limits": _beyond_limits(solved, profile) if converged else [],
+        "inside_corridor": load_corridor("design", profile).inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
         "source": "nonlinear" if request.solves_nonlinear else "database",
     }
 
 
-def _beyond_limits(solved: dict[str, float]) -> list[str]:
+def _beyond_limits(solved: dict[str, float], profile: AircraftProfile) -> list[str]:
     """What a trim asks of the aircraft that it cannot give, in words: the equations know no stops."""
     found = []
-    for key, low, high, unit in _STOPS:
+    for key, low, high, unit in _stops(profile):
         if not low - 1e-9 <= solved[key] <= high + 1e-9:
             name = key.removesuffix(f"_{unit}").removesuffix("_fraction").replace("_", " ")
             found.append(f"{name} {solved[key]:.3g} {unit}".rstrip() + f" (limits {low:g} to {high:g})")

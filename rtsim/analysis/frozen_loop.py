@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import required_position
 from rtsim.choices import OuterLoop
 from rtsim.lpv.database import Database
 from rtsim.lpv.lpv_kernels import LpvTables, lpv_step, work_size
 from rtsim.lpv.tables import Form, prepare_tables
-from rtsim.lpv.variables import required_position
 from rtsim.pilot import pilot_kernels as kernels
 from rtsim.pilot.design_plant import CONTROLS
 from rtsim.pilot.pilot_kernels import PilotTables

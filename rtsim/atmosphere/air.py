@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rtsim.aircraft.profile import AircraftProfile, xv15_profile
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere import gust_kernels as kernels
 from rtsim.atmosphere.gust_kernels import GustTables
@@ -20,8 +21,6 @@ GUST_SHAPES: dict[GustShape, int] = {
 """Shapes of discrete gusts: there and back (14 CFR 25.341), half a cosine (MIL-F-8785C) or straight, and staying."""
 LIVE_SLOTS = 8
 """Room for gusts that are added during a flight."""
-WING_SPAN = 32.17 * FOOT
-"""Wing span of the XV-15 [m] (NASA CR-166536)."""
 
 # MIL-F-8785C figure 7: intensity [ft/s] against height [ft] for probabilities of exceedance of 1e-2, 1e-3 and 1e-5,
 # which the specification calls light, moderate and severe; read from the figure by the authors of JSBSim (FGWinds).
@@ -34,14 +33,19 @@ _CURVES_FT_S: tuple[tuple[Severity, tuple[float, ...]], ...] = (
 )
 
 
-def gust_tables(air: AirSpecification) -> GustTables:
+def gust_tables(air: AirSpecification, profile: AircraftProfile | None = None) -> GustTables:
     """Give the parameters that the kernels read.
 
     Args:
         air: What the air does.
+        profile: The aircraft, whose span filters what it feels; None: the XV-15.
+
+    Raises:
+        InputError: The span is missing or out of range.
     """
+    dimensions = (xv15_profile() if profile is None else profile).dimensions
     turbulence = dryden.TurbulenceTables(
-        span=WING_SPAN,
+        span=dimensions.number("span_ft", low=1.0, high=1000.0) * FOOT,
         minimum_speed=air.minimum_speed,
         altitude=np.array(_CURVE_HEIGHT_FT) * FOOT,
         wind=np.array([SEVERITY_WIND[name] for name, _ in _CURVES_FT_S]),

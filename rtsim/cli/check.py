@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError
 
+if TYPE_CHECKING:
+    from rtsim.lpv import Database
+
 DATABASE_SUFFIXES = (".nc", ".mat")
 """Files with these endings are read as LPV databases."""
+PROFILE_SUFFIX = ".profile.toml"
+"""Files with this ending are read as aircraft profiles."""
 
 
 def register(app: typer.Typer) -> None:
@@ -27,7 +32,9 @@ def register(app: typer.Typer) -> None:
 def check_command(
     files: Annotated[
         list[str],
-        typer.Argument(help="Scenarios, campaigns, stick maps (.toml), library names, databases (.nc, .mat)."),
+        typer.Argument(
+            help="Scenarios, campaigns, stick maps (.toml), names, databases (.nc, .mat), aircraft profiles."
+        ),
     ],
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
@@ -73,6 +80,8 @@ def file_problems(name: str) -> list[str]:
         return [
             str(InputError("is no kind of file that rtsim reads", file=name, allowed=", ".join(choices), mend=mend))
         ]
+    if name.endswith(PROFILE_SUFFIX):
+        return _profile_problems(Path(name))
     if suffix == ".toml":
         keys = _top_keys(Path(name))
         # Scenarios have neither key.
@@ -105,6 +114,21 @@ def _campaign_problems(name: str) -> list[str]:
     return [str(problem) for problem in parse_campaign(Path(name).read_text(encoding="utf-8"), file=name)[1]]
 
 
+def _profile_problems(path: Path) -> list[str]:
+    """Mistakes of an aircraft's profile; read with its database where that stands beside it."""
+    from rtsim.aircraft.profile import read_profile
+
+    for suffix in DATABASE_SUFFIXES:
+        database = path.with_name(path.name.removesuffix(PROFILE_SUFFIX) + suffix)
+        if database.is_file():
+            return _database_problems(database)
+    try:
+        read_profile(path)
+    except RtsimError as error:
+        return [str(error)]
+    return []
+
+
 def _stick_map_problems(name: str) -> list[str]:
     from telemetry.joystick.stick_map import load_stick_map
 
@@ -115,13 +139,48 @@ def _stick_map_problems(name: str) -> list[str]:
     return []
 
 
+def check_profile(database: Database) -> None:
+    """Read every part of an aircraft's profile, as its flights do.
+
+    Args:
+        database: The aircraft.
+
+    Raises:
+        InputError: The first number that is missing or out of range.
+    """
+    from rtsim.aids import design_aids
+    from rtsim.aircraft.controls import control_tables
+    from rtsim.atmosphere import CALM
+    from rtsim.atmosphere.air import gust_tables
+    from rtsim.choices import ChartName
+    from rtsim.corridor import load_corridor
+    from rtsim.faults.schedule import fault_tables
+    from rtsim.nacelle import load_nacelle_tables
+    from rtsim.optimization.paths import conversion_end_kt
+    from rtsim.pilot.weights import pilot_settings
+    from rtsim.protection.limits import load_levels
+    from rtsim.protection.tables import law_tables
+    from rtsim.systems import load_drive_tables, load_flap_tables
+
+    profile = database.profile
+    for read in (control_tables, load_nacelle_tables, load_levels, load_flap_tables, load_drive_tables, pilot_settings):
+        read(profile)
+    for name in get_args(ChartName):
+        load_corridor(name, profile)
+    gust_tables(CALM, profile)
+    fault_tables((), profile)
+    conversion_end_kt(database)
+    design_aids(database)
+    law_tables("full", database, dt=0.004)
+
+
 def _database_problems(path: Path) -> list[str]:
     if not path.is_file():
         return [str(InputError("does not exist", file=str(path), mend="check the path"))]
     try:
         from rtsim.lpv.files.storage import load_database
 
-        load_database(path)
+        check_profile(load_database(path))
     except RtsimError as error:
         return [str(error)]
     return []

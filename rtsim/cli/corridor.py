@@ -31,13 +31,16 @@ def register(app: typer.Typer) -> None:
 def corridor_command(
     *,
     corridor: Annotated[
-        str, typer.Option(help="Which corridor: design, flight, or model (what the shipped aircraft's trims allow).")
+        str, typer.Option(help="Which corridor: design, flight, or model (what the aircraft's trims allow).")
     ] = "design",
     airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed of a point [kn].")] = None,
     nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle of the point [deg], 90 helicopter.")] = None,
     consistency: Annotated[
         bool, typer.Option("--consistency", help="Say where the corridor allows what the aircraft cannot trim.")
     ] = False,
+    database: Annotated[
+        Path | None, typer.Option(help="Another aircraft than the shipped XV-15: its LPV database (.nc, .mat).")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
 ) -> None:
@@ -46,10 +49,11 @@ def corridor_command(
     from rtsim.units import deg, kt
 
     point = _point(airspeed_kt, nacelle_deg)
-    if corridor == "model":
+    if corridor == "model" or database is not None:
+        from rtsim.lpv.files.storage import load_database
         from rtsim.protection import load_boundary
 
-        chosen = load_boundary(corridor)
+        chosen = load_boundary(corridor, load_database(database))
     else:
         chosen = load_corridor(corridor)
     result: dict[str, Any] = {"corridor_name": chosen.name, "boundaries": _boundaries(chosen)}
@@ -57,7 +61,7 @@ def corridor_command(
         margins = chosen.margins(kt(point[0]), deg(point[1]))
         result |= _point_result(chosen, point, margins)
     if consistency:
-        result["consistency"] = _inconsistencies(chosen)
+        result["consistency"] = _inconsistencies(chosen, database)
     if plot is not None:
         _draw(chosen, point, plot)
         result["plot_file"] = str(plot)
@@ -74,8 +78,8 @@ def corridor_command(
         console.print(f"Drew {plot}")
 
 
-def _inconsistencies(corridor: Corridor) -> list[dict[str, Any]]:
-    """Stretches where the corridor is wider than the level trims of the shipped aircraft within their limits."""
+def _inconsistencies(corridor: Corridor, database: Path | None) -> list[dict[str, Any]]:
+    """Stretches where the corridor is wider than the level trims of the aircraft within their limits."""
     from rtsim.lpv.files.storage import load_database
     from rtsim.protection import check_consistency
     from rtsim.units import to_deg, to_kt
@@ -89,7 +93,7 @@ def _inconsistencies(corridor: Corridor) -> list[dict[str, Any]]:
             "nacelle_deepest_deg": round(to_deg(found.nacelle_deepest), _DIGITS),
             "sentence": found.sentence(),
         }
-        for found in check_consistency(corridor, load_database())
+        for found in check_consistency(corridor, load_database(database))
     ]
 
 

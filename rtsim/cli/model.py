@@ -177,6 +177,7 @@ def summary(database: Database) -> dict[str, Any]:
     level = database.level_layer
     return {
         "content_hash": database.content_hash,
+        "profile": {"name": database.profile.name, "borrowed": list(database.profile.borrowed)},
         "attributes": dict(database.attributes),
         "current": _is_current(database),
         "layer_acceleration_kt_s": np.round(database.layer_acceleration / KNOT, 9),
@@ -200,7 +201,7 @@ def _inside_corridor(database: Database) -> npt.NDArray[np.bool_]:
 
     from rtsim.corridor import load_corridor
 
-    corridor = load_corridor("design")
+    corridor = load_corridor("design", database.profile)
     # 1e-6 m/s: a grid point on the boundary is inside whatever the rounding
     rows = [
         [corridor.low_speed(n) - 1e-6 <= v <= corridor.high_speed(n) + 1e-6 for n in database.nacelle]
@@ -254,5 +255,8 @@ def _print_summary(result: dict[str, Any]) -> None:
     table.add_row("neighbour check", f"{largest}{check['above']} of {check['pairs']} pairs above {check['limit']:g}")
     for kind in ("states", "inputs", "outputs"):
         table.add_row(f"{len(result[kind])} {kind}", ", ".join(result[kind]))
+    profile = result["profile"]
+    borrowed = f"; the XV-15's {', '.join(profile['borrowed'])}" if profile["borrowed"] else ""
+    table.add_row("profile", f"{profile['name']}{borrowed}")
     table.add_row("pilots", ", ".join(result["pilots"]) or "none")
     results.print(table)

@@ -209,7 +209,7 @@ def _save(
             }
             for point in result.front
         ]
-    if check:
+    if check and problem.has_nonlinear_model:
         console.print("Flying the winner on the nonlinear model; the first such flight compiles it (up to 60 s).")
         checked = nonlinear_check(problem, path)
         summary["nonlinear_check"] = figures_summary(checked)

@@ -27,6 +27,9 @@ def reproduce_command(
     *,
     out: Annotated[Path, typer.Option(help="Directory for the report, the claims and the figures.")],
     jobs: Annotated[int | None, typer.Option(help="Processes that fly; default one per core.", min=1, max=256)] = None,
+    database: Annotated[
+        Path | None, typer.Option(help="Another LPV database of the XV-15.", show_default="the shipped XV-15")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Regenerate the paper's figures from flights, judge its claims and write a report.
@@ -35,8 +38,9 @@ def reproduce_command(
     """
     from scenarios.reproduction.run import reproduce, total_work
 
+    file = "" if database is None else str(database.resolve())
     with progress("Flying the paper", total=total_work()) as advance:
-        done = reproduce(out, jobs=jobs if jobs is not None else os.cpu_count() or 1, progress=advance)
+        done = reproduce(out, jobs=jobs if jobs is not None else os.cpu_count() or 1, progress=advance, database=file)
     if json:
         emit_json(
             {

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
-from typing import TYPE_CHECKING, Any
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
 from rtsim.command import Margins
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
 
 LEVEL_NAMES = ("clear", "caution", "warning", "exceedance")
 """Words for the levels 0 to 3 of ``corridor_level``."""
-
-_FILE = "corridor.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,48 +164,57 @@ class Corridor:
         )
 
 
-@cache
-def load_corridor(name: str = "design") -> Corridor:
-    """Load a built-in corridor.
+@lru_cache(maxsize=16)
+def load_corridor(name: str = "design", profile: AircraftProfile | None = None) -> Corridor:
+    """Load an aircraft's corridor.
 
     Args:
-        name: ``design`` (NASA TM X-62407 attitude and stall limits) or ``flight`` (NASA TM 81244 power-on stall); both
-            share the high-speed side.
+        name: ``design`` (XV-15: NASA TM X-62407 attitude and stall limits) or ``flight`` (NASA TM 81244 power-on
+            stall); the XV-15's share the high-speed side.
+        profile: The aircraft; None: the XV-15.
 
     Raises:
-        InputError: There is no such corridor.
+        InputError: There is no such corridor, or a value is missing or out of range.
     """
-    data = tomllib.loads(resources.files("rtsim.aircraft.xv15").joinpath("data", _FILE).read_text(encoding="utf-8"))
-    if name not in data["corridor"]:
-        raise InputError("no such corridor", key="corridor", value=name, allowed=", ".join(data["corridor"]))
-    entry, levels = data["corridor"][name], data["levels"]
+    part = (xv15_profile() if profile is None else profile).corridor
+    named, levels, downstop = part.table("corridor"), part.table("levels"), part.table("downstop")
+    if not named.has(name):
+        raise InputError("no such corridor", key="corridor", value=name, allowed=", ".join(named.data))
+    entry = named.table(name)
+    sources = part.table("sources").data if part.has("sources") else {}
+    threshold = levels.numbers("threshold_kn", low=-100.0, high=200.0, count=3)
     return Corridor(
         name=name,
-        title=entry["title"],
-        low=_boundary(data["low"][entry["low"]], data["sources"]),
-        high=_boundary(data["high"][entry["high"]], data["sources"]),
-        downstop_nacelle=deg(data["downstop"]["nacelle_deg"]),
-        downstop_speed=kt(data["downstop"]["high_kn"]),
+        title=entry.text("title"),
+        low=_boundary(part.table("low").table(entry.text("low")), sources),
+        high=_boundary(part.table("high").table(entry.text("high")), sources),
+        downstop_nacelle=deg(downstop.number("nacelle_deg", low=0.0, high=10.0)),
+        downstop_speed=kt(downstop.number("high_kn", low=1.0, high=600.0)),
         levels=Levels(
-            threshold=_read_only([kt(value) for value in levels["threshold_kn"]]),
-            hysteresis=kt(levels["hysteresis_kn"]),
-            rise_time=levels["rise_s"],
-            fall_time=levels["fall_s"],
+            threshold=_read_only([kt(value) for value in threshold]),
+            hysteresis=kt(levels.number("hysteresis_kn", low=0.0, high=50.0)),
+            rise_time=levels.number("rise_s", low=0.0, high=60.0),
+            fall_time=levels.number("fall_s", low=0.0, high=60.0),
         ),
     )
 
 
-def _boundary(entry: Mapping[str, Any], sources: Mapping[str, str]) -> Boundary:
-    source = entry["source"]
+def _boundary(entry: Part, sources: Mapping[str, str]) -> Boundary:
+    source = entry.text("source")
     for code, text in sources.items():
         if code in source:
             source += f" [{code}: {text}]"
-    return Boundary(
-        nacelle=_read_only([deg(value) for value in reversed(entry["nacelle_deg"])]),
-        speed=_read_only([kt(value) for value in reversed(entry["speed_kn"])]),
-        kind=entry["kind"],
-        source=source,
-    )
+    nacelle = entry.numbers("nacelle_deg", low=0.0, high=95.0)
+    speed = entry.numbers("speed_kn", low=-200.0, high=600.0, count=len(nacelle))
+    try:
+        return Boundary(
+            nacelle=_read_only([deg(value) for value in reversed(nacelle)]),
+            speed=_read_only([kt(value) for value in reversed(speed)]),
+            kind=entry.text("kind"),
+            source=source,
+        )
+    except InputError as error:
+        raise InputError(error.problem, file=entry.file, key=f"{entry.name}.{error.key}") from None
 
 
 def _read_only(values: list[float]) -> FloatArray:

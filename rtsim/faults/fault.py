@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from rtsim.aircraft.profile import AircraftProfile, xv15_profile
 from rtsim.errors import InputError
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
@@ -26,15 +27,33 @@ EngineRating = Literal["contingency", "takeoff", "military", "normal"]
 
 ACTUATORS: tuple[Actuator, ...] = ("collective", "cyclic", "elevator")
 """Actuators that can fail, in the order of the aircraft's states."""
-ENGINE_RATING: dict[EngineRating, float] = {
-    "contingency": 1802.0 * HORSEPOWER,
-    "takeoff": 1550.0 * HORSEPOWER,
-    "military": 1401.0 * HORSEPOWER,
-    "normal": 1250.0 * HORSEPOWER,
-}
-"""Power of one LTC1K-4K engine by rating [W] (NASA TM X-62407)."""
-TRANSMISSION_EFFICIENCY = 0.93
-"""Shaft power of the rotors over engine power (NASA TM X-62407)."""
+LARGEST_POWER = 1e7
+"""Largest power left to a failing engine [W]; what the aircraft's engine gives at most counts besides."""
+
+
+def engine_rating(profile: AircraftProfile, rating: EngineRating) -> float:
+    """Power of one engine [W].
+
+    Args:
+        profile: The aircraft.
+        rating: The rating.
+
+    Raises:
+        InputError: The profile does not say, or the value is out of range.
+    """
+    return profile.systems.table("engine").number(f"{rating}_shp", low=1.0, high=1e5) * HORSEPOWER
+
+
+def transmission_efficiency(profile: AircraftProfile) -> float:
+    """Shaft power of the rotors over engine power.
+
+    Args:
+        profile: The aircraft.
+
+    Raises:
+        InputError: The value is missing or out of range.
+    """
+    return profile.systems.table("engine").number("transmission_efficiency", low=0.1, high=1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +85,7 @@ class Fault:
         _within("start", self.start, 0.0, 36_000.0, "s")
         if self.end is not None and not (math.isfinite(self.end) and self.end > self.start):
             raise InputError("is not after start", key="end", value=self.end, allowed=f"above {self.start:g} s")
-        _choice("other_engine", self.other_engine, tuple(ENGINE_RATING))
+        _choice("other_engine", self.other_engine, get_args(EngineRating))
         needed = {
             "actuator": self.kind.startswith("actuator"),
             "rate": self.kind in {"nacelle-slow", "actuator-slow"},
@@ -93,20 +112,28 @@ class Fault:
         if self.bias is not None:
             _within("bias", self.bias, -100.0 * KNOT, 100.0 * KNOT, "m/s")
         if self.power is not None:
-            _within("power", self.power, 0.0, ENGINE_RATING["contingency"], "W")
+            _within("power", self.power, 0.0, LARGEST_POWER, "W")
 
     @property
     def name(self) -> str:
         """The failure in one word, as in the event log: ``cyclic-stuck``, ``nacelle-jammed``."""
         return self.kind if self.actuator is None else self.kind.replace("actuator", self.actuator, 1)
 
-    @property
-    def value(self) -> float:
-        """Its size: rate [rad/s], bias [m/s], shaft power available [W], -1 or 1 for a stop; 0 where there is none."""
+    def size(self, profile: AircraftProfile | None = None) -> float:
+        """Its size: rate [rad/s], bias [m/s], shaft power available [W], -1 or 1 for a stop; 0 where there is none.
+
+        Args:
+            profile: The aircraft, whose other engine counts; None: the XV-15.
+
+        Raises:
+            InputError: The failing engine would give more than a sound one.
+        """
         if self.stop is not None:
             return 1.0 if self.stop == "high" else -1.0
         if self.power is not None:
-            return TRANSMISSION_EFFICIENCY * (self.power + ENGINE_RATING[self.other_engine])
+            aircraft = xv15_profile() if profile is None else profile
+            _within("power", self.power, 0.0, engine_rating(aircraft, "contingency"), "W")
+            return transmission_efficiency(aircraft) * (self.power + engine_rating(aircraft, self.other_engine))
         for number in (self.bias, self.rate):
             if number is not None:
                 return number
@@ -132,17 +159,18 @@ class FaultEvent:
     name: str
     """The failure, and whether it begins or ends: ``cyclic-stuck on``."""
     value: float
-    """Its size, see ``Fault.value``."""
+    """Its size, see ``Fault.size``."""
 
 
-def fault_events(faults: Sequence[Fault]) -> tuple[FaultEvent, ...]:
+def fault_events(faults: Sequence[Fault], profile: AircraftProfile | None = None) -> tuple[FaultEvent, ...]:
     """Give the changes of a flight's failures in the order in which the kernels make them.
 
     Args:
         faults: The failures.
+        profile: The aircraft; None: the XV-15.
     """
     return tuple(
-        FaultEvent(time, f"{fault.name} {'on' if on else 'off'}", fault.value)
+        FaultEvent(time, f"{fault.name} {'on' if on else 'off'}", fault.size(profile))
         for time, fault, on in fault_changes(faults)
     )
 

@@ -71,6 +71,9 @@ F_POWER = 17
 """Shaft power of both rotors that the engines can give [W]."""
 FAULT_STATE_SIZE = 18
 
+ACTUATOR_STATES = (STATE.collective_75, STATE.cyclic_1s, STATE.elevator)
+"""State of each actuator channel."""
+
 MASK_JAMMED, MASK_NACELLE_SLOW, MASK_COLLECTIVE, MASK_CYCLIC, MASK_ELEVATOR, MASK_AIRSPEED, MASK_ENGINE = (
     1,
     2,
@@ -129,7 +132,7 @@ def fault_apply(
         place = F_ACTUATOR + ACTUATOR_BLOCK * channel
         if on != 0.0:
             state[place + A_MODE] = kind
-            state[place + A_VALUE] = x[STATE.collective_75 + channel] if kind == KIND_STUCK else value
+            state[place + A_VALUE] = x[ACTUATOR_STATES[channel]] if kind == KIND_STUCK else value
             state[place + A_RATE] = change[AT_RATE]
         elif state[place + A_MODE] == kind:
             state[place + A_MODE] = 0.0
@@ -297,7 +300,7 @@ def fault_actuators_begin(
     for channel in range(3):
         place = F_ACTUATOR + ACTUATOR_BLOCK * channel
         mode = state[place + A_MODE]
-        begin = x[STATE.collective_75 + channel]
+        begin = x[ACTUATOR_STATES[channel]]
         command, lower, upper = collective, low, high
         if channel == 1:
             command, lower, upper = cyclic, -controls.cyclic_limit, controls.cyclic_limit
@@ -322,7 +325,7 @@ def fault_actuators_begin(
         if end != own:
             planned[channel] = end
             mean = 0.5 * (begin + end)
-            x[STATE.collective_75 + channel] = (mean - 0.5 * gone * command) / (1.0 - 0.5 * gone)
+            x[ACTUATOR_STATES[channel]] = (mean - 0.5 * gone * command) / (1.0 - 0.5 * gone)
 
 
 @inner_kernel
@@ -335,4 +338,4 @@ def fault_actuators_end(planned: FloatArray, x: FloatArray) -> None:
     """
     for channel in range(3):
         if not math.isnan(planned[channel]):
-            x[STATE.collective_75 + channel] = planned[channel]
+            x[ACTUATOR_STATES[channel]] = planned[channel]

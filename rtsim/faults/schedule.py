@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rtsim.aircraft.profile import AircraftProfile, xv15_profile
 from rtsim.faults import fault_kernels as kernels
 from rtsim.faults.fault import ACTUATORS, Fault, FaultKind, fault_changes
 from rtsim.faults.fault_kernels import FaultTables
@@ -25,45 +26,46 @@ KINDS: dict[FaultKind, int] = {
 """Failures by name, with their number in the kernels."""
 HARD_OVER_RATE = 20.0 * DEGREE
 """Rate of a hard-over that gives none [rad/s]: assumed, the XV-15's actuator rates are not published."""
-GOVERNOR_FREQUENCY = 3.0
-"""How fast the governor takes collective off [rad/s]: assumed, half the bandwidth of the collective's actuator."""
-POWER_PER_COLLECTIVE = 200.0 * HORSEPOWER / DEGREE
-"""Shaft power of both rotors per collective without axial flow [W/rad]; fitted to the database, docs/faults.md."""
-POWER_PER_COLLECTIVE_SPEED = 7.5 * HORSEPOWER / DEGREE / KNOT
-"""Its growth with the airspeed along the mast [W s/(rad m)]; fitted likewise."""
 
 
-def fault_change(fault: Fault, *, on: bool, time: float) -> FloatArray:
+def fault_change(fault: Fault, *, on: bool, time: float, profile: AircraftProfile | None = None) -> FloatArray:
     """Give the row of a schedule that lets a failure begin or end, shape (SCHEDULE_COLUMNS,).
 
     Args:
         fault: The failure.
         on: Begins; else ends.
         time: When [s].
+        profile: The aircraft; None: the XV-15.
     """
     channel = 0 if fault.actuator is None else ACTUATORS.index(fault.actuator)
     rate = fault.rate if fault.kind == "actuator-hard-over" and fault.rate is not None else HARD_OVER_RATE
-    row = np.array([time, KINDS[fault.kind], channel, fault.value, rate, 1.0 if on else 0.0])
+    row = np.array([time, KINDS[fault.kind], channel, fault.size(profile), rate, 1.0 if on else 0.0])
     row.setflags(write=False)  # like the rows of a schedule, so that one compiled kernel serves both
     return row
 
 
-def fault_tables(faults: Sequence[Fault]) -> FaultTables:
+def fault_tables(faults: Sequence[Fault], profile: AircraftProfile | None = None) -> FaultTables:
     """Give the tables that the kernels read.
 
     Args:
         faults: The failures of a flight, in any order.
+        profile: The aircraft; None: the XV-15.
+
+    Raises:
+        InputError: A value of the aircraft's governor is missing or out of range.
     """
+    governor = (xv15_profile() if profile is None else profile).systems.table("governor")
     schedule = np.zeros((0, kernels.SCHEDULE_COLUMNS))
     changes = fault_changes(faults)
     if changes:
-        schedule = np.stack([fault_change(fault, on=on, time=time) for time, fault, on in changes])
+        schedule = np.stack([fault_change(fault, on=on, time=time, profile=profile) for time, fault, on in changes])
     schedule.setflags(write=False)
+    growth = governor.number("power_per_collective_speed_hp_deg_kt", low=0.0, high=1e6)
     return FaultTables(
         schedule=schedule,
-        governor_frequency=GOVERNOR_FREQUENCY,
-        power_per_collective=POWER_PER_COLLECTIVE,
-        power_per_collective_speed=POWER_PER_COLLECTIVE_SPEED,
+        governor_frequency=governor.number("collective_frequency_rad_s", low=0.0, high=100.0),
+        power_per_collective=governor.number("power_per_collective_hp_deg", low=1e-3, high=1e6) * HORSEPOWER / DEGREE,
+        power_per_collective_speed=growth * HORSEPOWER / DEGREE / KNOT,
     )
 
 

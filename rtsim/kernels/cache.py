@@ -21,7 +21,8 @@ FORGOTTEN_AFTER_S = 30 * 86_400.0
 
 
 _IMPORT = re.compile(
-    r"^(?:from ((?:rtsim|scenarios)[\w.]*) import ([^\n(]+|\([^)]*\))|import ((?:rtsim|scenarios)[\w.]*))", re.MULTILINE
+    r"^[ \t]*(?:from ((?:rtsim|scenarios)[\w.]*) import ([^\n(]+|\([^)]*\))|import ((?:rtsim|scenarios)[\w.]*))",
+    re.MULTILINE,
 )
 
 
@@ -32,7 +33,7 @@ def kernel_sources(root: Path) -> dict[Path, bytes]:
         root: The folder that holds the packages.
 
     Returns:
-        Contents by path. An import inside a function does not count: kernels have none.
+        Contents by path. An import inside a function or a ``try`` counts too.
     """
     left = [path for package in PACKAGES for path in (root / package).rglob("*_kernels.py")]
     found: dict[Path, bytes] = {}

@@ -63,6 +63,12 @@ class WholeLibrary(JITCodeLibrary):
         self._linking_libraries = ordered[::-1]
         super().finalize()
 
+    def _optimize_final_module(self) -> None:
+        """Vectorise straight code as well as loops; numba leaves that out."""
+        for options in ({"cost": "cheap", "slp_vectorize": False}, {"slp_vectorize": True}):
+            manager, builder = self._codegen._module_pass_manager(**options)
+            manager.run(self._final_module, builder)
+
 
 @compiler_machinery.register_pass(mutates_CFG=False, analysis_only=True)
 class _LowerInto(compiler_machinery.AnalysisPass):

@@ -29,6 +29,8 @@ from numba.extending import (
 from numba.np import arrayobj
 
 Tuple = TypeVar("Tuple")
+_SIZE = "size"
+"""Stands for the type of a ``Size``."""
 _DTYPES = {"<f8": types.float64, "<i8": types.int64}
 
 
@@ -45,6 +47,8 @@ class PackedType(types.Type):
         self.class_name = class_name
         self.fields = {name: (kind, place) for name, kind, place in fields}
         layout = repr([(name, str(kind), place) for name, kind, place in fields])
+        self.sizes = {name: place for name, kind, place in fields if kind is _SIZE}
+        """Values of the fields that are constants, which have no word of their own."""
         super().__init__(name=f"{class_name}_{hashlib.sha256(layout.encode()).hexdigest()[:12]}")
 
 
@@ -79,6 +83,10 @@ class Packed:
 
     def _replace(self, **changes: Any) -> Any:
         return packed(self._tuple._replace(**changes))
+
+
+class Size(int):
+    """A whole number that is part of the type: a constant to compiled code, which unrolls loops over it."""
 
 
 class Address:
@@ -126,6 +134,8 @@ def packed(values: Tuple) -> Tuple:
             kinds.append((name, value._kind, place))
             inner.append((name, place, len(value._words)))
             words.extend(value._words.tolist())
+        elif isinstance(value, Size):
+            kinds.append((name, _SIZE, int(value)))
         else:
             kind, content = _numbers(value)
             kinds.append((name, kind, place))
@@ -173,12 +183,15 @@ class _Attributes(AttributeTemplate):
     key = PackedType
 
     def generic_resolve(self, kind: Any, name: str) -> Any:
-        return kind.fields[name][0] if name in kind.fields else None
+        field = kind.fields.get(name, (None, 0))[0]
+        return types.int64 if field is _SIZE else field
 
 
 @lower_getattr_generic(PackedType)
 def _read(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     field, place = kind.fields[name]
+    if field is _SIZE:
+        return context.get_constant(types.int64, place)
     if isinstance(field, PackedType):
         return cgutils.pointer_add(builder, value, 8 * place, return_type=value.type)
 

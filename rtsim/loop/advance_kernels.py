@@ -12,7 +12,6 @@ from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.atmosphere.gust_kernels import G_BUSY
 from rtsim.corridor.corridor_kernels import corridor_level_step
-from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import F_ENGINE, F_POWER, fault_actuators_end, fault_nacelle_rate
 from rtsim.frame import COLUMN, QUANTITY, FloatArray
 from rtsim.kernels.compiled import inner_kernel
@@ -188,7 +187,7 @@ def record(flight: Flight) -> None:
         row[column] = si[column] / tables.units[column]
     # Divided in this order since the first history; the other order differs in the last bit.
     shaft = engine_power(state.drive, si[QUANTITY.power])
-    row[COLUMN.engine_power_shp] = shaft / HORSEPOWER / TRANSMISSION_EFFICIENCY
+    row[COLUMN.engine_power_shp] = shaft / HORSEPOWER / tables.drive.efficiency
 
 
 @inner_kernel

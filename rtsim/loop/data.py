@@ -80,6 +80,8 @@ class PlantTables(NamedTuple):
     """Mass, air, rotor speed, flap."""
     controls: ControlTables
     """Mixing, limits, flap schedule."""
+    alpha_speed: float
+    """Added along the horizon before an angle of attack is recorded, as for scheduling [m/s]."""
 
 
 class ScriptTables(NamedTuple):

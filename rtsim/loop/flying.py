@@ -6,13 +6,15 @@ frame that the flight needs is compiled when it is first needed, before the fram
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from rtsim.aircraft.variables import INPUT
-from rtsim.atmosphere.air import normals_needed
+from rtsim.atmosphere.dryden_kernels import T_ACTIVE
+from rtsim.atmosphere.gust_kernels import NORMALS_PER_FRAME
 from rtsim.frame import SIGNAL_COUNT, FloatArray
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import packed
@@ -34,7 +36,7 @@ from rtsim.pilot.engage_kernels import mocm_engage
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
 
 WHOLE, COMPLETE = frames_of.WHOLE, frames_of.COMPLETE
-NO_ROWS = np.zeros((0, SIGNAL_COUNT))
+NO_ROWS = np.zeros(0)
 _NO_NORMALS = np.zeros((1, 0))
 _STILL = np.zeros((1, 3))
 """Normals of the air where no time passes."""
@@ -58,7 +60,7 @@ def new_streams(seed: int) -> Streams:
 class Flying:
     """One flight."""
 
-    __slots__ = ("_entry", "_nonlinear", "_unlocked", "flight", "noise_width", "state", "streams")
+    __slots__ = ("_call", "_gusts", "_nonlinear", "flight", "noise_width", "state", "streams")
 
     def __init__(
         self,
@@ -92,14 +94,14 @@ class Flying:
         """Its state."""
         self.streams = streams
         """Random streams of the pilot's noise and of the turbulence."""
-        self.noise_width, self._nonlinear = noise_width, nonlinear
+        self.noise_width, self._nonlinear, self._gusts = noise_width, nonlinear, state.gusts
         self._load("outputs", "step")
         arguments = (self.flight, NO_ROWS, _NO_NORMALS, _NO_NORMALS, 0, 0)
-        self._entry = entry_of(frames_of.fly_frames, *arguments)
-        self._unlocked: tuple[Any, int] | None = None
         if unlocked:
             address = part_address(frames_of.fly_frames, *arguments)
-            self._unlocked = (entry_of(frames_of.fly_unlocked, address, *arguments), address)
+            self._call = functools.partial(entry_of(frames_of.fly_unlocked, address, *arguments), address)
+        else:
+            self._call = entry_of(frames_of.fly_frames, *arguments)
         beside.finish("nonlinear" if nonlinear else "lpv")
         self._load("ask", "advance")
         if tables.automatic.active:
@@ -136,7 +138,7 @@ class Flying:
         """Fly frames.
 
         Args:
-            rows: Written: their rows, shape (frames, SIGNAL_COUNT); ``NO_ROWS`` keeps none.
+            rows: Written: their rows, C-contiguous, frames * SIGNAL_COUNT numbers; ``NO_ROWS`` keeps none.
             frames: How many at most.
             stages: Stages of the first frame.
 
@@ -147,15 +149,25 @@ class Flying:
         if stages & COMPLETE or frames > 1:
             if self.noise_width:
                 noise = self.streams[0].standard_normal((frames, self.noise_width))
-            width = normals_needed(self.state.gusts)
-            if width:
-                air = self.streams[1].standard_normal((frames, width))
-        flown = self._call(rows, noise, air, frames, stages)
-        while self.state.clock[CLOCK.missing] != 0.0:
+            if self._gusts.item(T_ACTIVE):
+                air = self.streams[1].standard_normal((frames, NORMALS_PER_FRAME))
+        flown = self._call(self.flight, rows, noise, air, frames, stages)
+        if flown >= 0.0:
+            return int(flown)
+        return self._complete(rows, noise, air, frames, stages, int(-1 - flown))
+
+    def _complete(
+        self, rows: FloatArray, noise: FloatArray, air: FloatArray, frames: int, stages: int, flown: int
+    ) -> int:
+        """Load what was missing and fly on, until nothing is."""
+        while True:
             self._load_missing()
-            left = noise[flown:] if noise.shape[1] else noise, air[flown:] if air.shape[1] else air
-            flown += self._call(rows[flown:], *left, frames - flown, WHOLE if flown else stages)
-        return flown
+            left = rows[flown * SIGNAL_COUNT :] if rows.size else rows
+            normals = noise[flown:] if noise.shape[1] else noise, air[flown:] if air.shape[1] else air
+            more = self._call(self.flight, left, *normals, frames - flown, WHOLE if flown else stages)
+            if more >= 0.0:
+                return flown + int(more)
+            flown += int(-1 - more)
 
     def run(self, frames: int) -> int:
         """Fly frames without keeping their rows, for measures.
@@ -177,10 +189,8 @@ class Flying:
         Args:
             stages: Which.
         """
-        self._call(NO_ROWS, _NO_NORMALS, _STILL, 1, stages)
-        while self.state.clock[CLOCK.missing] != 0.0:
-            self._load_missing()
-            self._call(NO_ROWS, _NO_NORMALS, _STILL, 1, stages)
+        if self._call(self.flight, NO_ROWS, _NO_NORMALS, _STILL, 1, stages) < 0.0:
+            self._complete(NO_ROWS, _NO_NORMALS, _STILL, 1, stages, 0)
 
     def engage(self) -> None:
         """Let the MOCM take the controls as they are: its state is set so that its first output equals them.
@@ -201,12 +211,6 @@ class Flying:
         """
         for mine, start in zip(self.state, state, strict=True):
             mine[:] = start
-
-    def _call(self, rows: FloatArray, noise: FloatArray, air: FloatArray, frames: int, stages: int) -> int:
-        if self._unlocked is not None:
-            entry, address = self._unlocked
-            return int(entry(address, self.flight, rows, noise, air, frames, stages))
-        return int(self._entry(self.flight, rows, noise, air, frames, stages))
 
     def _load_missing(self) -> None:
         missing = int(self.state.clock[CLOCK.missing]) - 1

@@ -103,14 +103,15 @@ def fly_frames(
 
     Args:
         flight: The flight.
-        rows: Written: the frames' rows, shape (frames, signals); shape (0, signals): they are not kept.
+        rows: Written: the frames' rows, one after the other, frames * signals numbers; empty: they are not kept.
         pilot_normals: Standard normals of the pilot, one row per frame; shape (1, 0) without noise.
         air_normals: Standard normals of the air, one row per frame; shape (1, 0) without turbulence.
         frames: How many frames.
         stages: Stages of the first frame; the others are flown whole.
 
     Returns:
-        How many frames were begun, and finished where their last stage was asked for.
+        How many frames were begun, and finished where their last stage was asked for; where a part was missing for the
+        next one, -1 less that number.
     """
     clock = flight.state.clock
     noisy, rough, kept = pilot_normals.shape[1] > 0, air_normals.shape[1] > 0, rows.shape[0] > 0
@@ -119,12 +120,12 @@ def fly_frames(
             return float(k)
         clock[CLOCK.missing] = float(missing_part(flight))
         if clock[CLOCK.missing] != 0.0:
-            return float(k)
+            return float(-1 - k)
         advance(flight, stages, pilot_normals[k if noisy else 0], air_normals[k if rough else 0])
         if kept and stages & COMPLETE:
             row = flight.scratch.row
             for column in range(row.shape[0]):
-                rows[k, column] = row[column]
+                rows[k * row.shape[0] + column] = row[column]
         stages = WHOLE
     return float(frames)
 

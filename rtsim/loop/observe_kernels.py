@@ -9,7 +9,6 @@ from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_Q, G_U, G_W
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import corridor_margins
-from rtsim.faults.fault import TRANSMISSION_EFFICIENCY
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
 from rtsim.frame import QUANTITY, FloatArray
 from rtsim.kernels.compiled import inner_kernel
@@ -104,7 +103,8 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.climb_rate] = climb
     si[QUANTITY.distance] = state.clock[CLOCK.distance]
     si[QUANTITY.flight_path] = math.atan2(climb, max(abs(through), 1.0))
-    si[QUANTITY.angle_of_attack] = scheduling_alpha(x[STATE.u] + gusts[G_U], x[STATE.w] + gusts[G_W], st, ct)
+    ahead, below = x[STATE.u] + gusts[G_U], x[STATE.w] + gusts[G_W]
+    si[QUANTITY.angle_of_attack] = scheduling_alpha(ahead, below, st, ct, tables.plant.alpha_speed)
     si[QUANTITY.pitch_rate] = x[STATE.q]
     si[QUANTITY.body_u] = x[STATE.u]
     si[QUANTITY.body_w] = x[STATE.w]
@@ -118,7 +118,7 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.flap] = flap_now(state.flaps, flap_scheduled)
     si[QUANTITY.thrust_per_rotor] = y[OUTPUT.thrust]
     si[QUANTITY.power] = power
-    si[QUANTITY.engine_power] = engine_power(state.drive, power) / TRANSMISSION_EFFICIENCY
+    si[QUANTITY.engine_power] = engine_power(state.drive, power) / tables.drive.efficiency
     si[QUANTITY.mast_torque] = y[OUTPUT.torque]
     si[QUANTITY.rotor_speed] = rotor_speed
     si[QUANTITY.margin] = min(scratch.margins[0], scratch.margins[1])

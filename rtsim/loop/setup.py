@@ -11,7 +11,9 @@ import numpy as np
 
 from rtsim.aids import design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
-from rtsim.aircraft import INPUT, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft import INPUTS, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft.controls import control_tables
+from rtsim.aircraft.variables import AUXILIARY_INPUTS, of_role
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.atmosphere import CALM, AirSpecification
@@ -50,8 +52,7 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
-from rtsim.lpv.tables import Form, prepare_tables
-from rtsim.lpv.variables import AUXILIARY_INPUTS
+from rtsim.lpv.tables import Form, prepare_tables, scheduling_speed
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
@@ -115,8 +116,10 @@ class Parts:
     """The nonlinear aircraft flies."""
     noise_width: int
     """Standard normals the pilot takes per frame; 0 with the noise off."""
+    database: Database = field(repr=False)
+    """The LPV database in use, with the aircraft's profile."""
     database_hash: str
-    """Content hash of the database."""
+    """Hash of the aircraft."""
     needed_aids: tuple[SwitchName, ...]
     """Aids that cannot be switched off: the database does not say what the aircraft does without them."""
     start_x: FloatArray = field(repr=False)
@@ -185,6 +188,12 @@ def build_parts(setup: FlightSetup) -> Parts:
     beside.start("nonlinear" if nonlinear else "lpv")
     loaded = load_database(options.database or None)
     database = flown_database(loaded, options.database or None)
+    profile = database.profile
+    if nonlinear and not profile.is_xv15:
+        raise InputError(
+            f"there is no nonlinear model of the {profile.name}", key="plant", value=options.plant,
+            allowed="lpv, lpv-plain", mend="fly the LPV aircraft",
+        )  # fmt: skip
     own = Xv15.load().tables
     airspeed, nacelle, altitude = _start(setup)
     x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle))
@@ -198,17 +207,18 @@ def build_parts(setup: FlightSetup) -> Parts:
         plant=PlantTables(
             aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[options.plant])),
             configuration=own.configuration,
-            controls=own.controls,
+            controls=control_tables(profile),
+            alpha_speed=scheduling_speed(database),
         ),
-        nacelle=load_nacelle_tables(),
-        automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(),
+        nacelle=load_nacelle_tables(profile),
+        automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
         corridor=_corridor_tables(corridor, database),
         pilot=pilot,
-        flaps=load_flap_tables(own),
-        drive=load_drive_tables(own),
+        flaps=load_flap_tables(profile),
+        drive=load_drive_tables(profile, governed_speed=database.rotor_speed),
         aids=design_aids(database),
-        gusts=gust_tables(setup.air),
-        faults=fault_tables(setup.faults),
+        gusts=gust_tables(setup.air, profile),
+        faults=fault_tables(setup.faults, profile),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
         protection=_law(compiled_law(load_laws(options.protection)) or "monitor", corridor, database, dt),
         programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
@@ -220,7 +230,8 @@ def build_parts(setup: FlightSetup) -> Parts:
         tables=tables,
         nonlinear=nonlinear,
         noise_width=interpreted(noise_width)(pilot) if options.pilot_noise else 0,
-        database_hash=loaded.content_hash,
+        database=database,
+        database_hash=loaded.aircraft_hash,
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
         start_u=u,
@@ -302,7 +313,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     clock = np.zeros(CLOCK.size)
     clock[CLOCK.mode] = MODES["mocm" if options.mocm_begins else "external"]
     u = parts.start_u.copy()
-    u[INPUT.nacelle_rate :] = 0.0
+    u[[place for place in range(len(INPUTS)) if place not in of_role(INPUTS, "pilot")]] = 0.0
     held = np.full(HELD.size, np.nan)
     held[HELD.stick_reason :] = 0.0
     state = SimulationState(

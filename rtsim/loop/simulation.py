@@ -21,10 +21,11 @@ from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
 from rtsim.kernels.compiled import interpreted
-from rtsim.loop.data import CLOCK, END_REASONS, MODES, STATION, TARGET, SimulationState
+from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState
 from rtsim.loop.flying import WHOLE, Flying
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
+from rtsim.lpv.database import Database
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import L_OVERRIDE
@@ -77,7 +78,8 @@ class Simulation:
         if laws is None:
             options = setup.options
             chain = load_laws(options.protection, boundary=options.corridor_name, database=options.database)
-            laws = LawChain(chain, dt=self.tables.dt) if compiled_law(chain) is None else None
+            if compiled_law(chain) is None:
+                laws = LawChain(chain, dt=self.tables.dt, profile=self.database.profile)
         self.laws = laws
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
 
@@ -113,8 +115,13 @@ class Simulation:
         return next(name for name, value in MODES.items() if value == number)
 
     @property
+    def database(self) -> Database:
+        """The LPV database in use, with the aircraft's profile."""
+        return self._parts.database
+
+    @property
     def database_hash(self) -> str:
-        """Content hash of the LPV database in use."""
+        """Hash of the aircraft: of the LPV database and, where it has one of its own, of its profile."""
         return self._parts.database_hash
 
     @property
@@ -178,10 +185,9 @@ class Simulation:
         Returns:
             The frame's row, shape (SIGNAL_COUNT,), a new array.
         """
-        rows: FloatArray = np.empty((1, SIGNAL_COUNT))
-        row: FloatArray = rows[0]
+        row: FloatArray = np.empty(SIGNAL_COUNT)
         if command is None and applied is None:
-            self._fly(rows, 1, WHOLE)
+            self._fly(row, 1, WHOLE)
             return row
         stations = self._scratch.command
         if command is None:
@@ -190,7 +196,7 @@ class Simulation:
             stations[STATION.pilot] = stations[STATION.hands] = _numbers(command)
         if applied is not None:
             stations[STATION.hands] = _numbers(applied)
-        self._fly(rows, 1, OBSERVE | LIMIT | COMPLETE | (SCRIPT if scripted else 0))
+        self._fly(row, 1, OBSERVE | LIMIT | COMPLETE | (SCRIPT if scripted else 0))
         return row
 
     def run(self, frames: int, rows: FloatArray | None = None) -> FloatArray:
@@ -204,7 +210,7 @@ class Simulation:
             The rows, shape (frames flown, SIGNAL_COUNT).
         """
         rows = np.empty((frames, SIGNAL_COUNT)) if rows is None else rows
-        return rows[: self._fly(rows, frames, WHOLE)]
+        return rows[: self._fly(rows.reshape(-1), frames, WHOLE)]
 
     def _fly(self, rows: FloatArray, frames: int, stages: int) -> int:
         """Fly frames, the first with these stages, asking the laws in Python where they are due."""
@@ -296,7 +302,7 @@ class Simulation:
         self._observe()
         airspeed = float(self._scratch.si[QUANTITY.airspeed])
         state, frequency = self._state, self.tables.nacelle.frequency
-        change = fault_change(fault, on=on, time=self.time)
+        change = fault_change(fault, on=on, time=self.time, profile=self.database.profile)
         interpreted(fault_apply)(state.faults, change, state.x, state.nacelle, frequency, airspeed)
         state.clock[CLOCK.faults] = 1.0
         self._observed = False
@@ -393,25 +399,25 @@ def fly_with_laws(flying: Flying, laws: LawChain, rows: FloatArray, frames: int,
     Args:
         flying: The flight.
         laws: The laws.
-        rows: Written: their rows, shape (frames, SIGNAL_COUNT).
+        rows: Written: their rows, frames * SIGNAL_COUNT numbers.
         frames: How many at most.
         stages: Stages of the first frame.
 
     Returns:
         How many were flown.
     """
-    state, scratch = flying.state, flying.scratch
+    clock, held, scratch = flying.state.clock, flying.state.held, flying.scratch
+    protected, sensors, shown = scratch.command[STATION.protected], scratch.sensors, scratch.shown
     flown = 0
-    while flown < frames and not flying.ended:
-        frame = int(state.clock[CLOCK.frame])
+    while flown < frames and clock.item(CLOCK.end) == END.none:
+        frame = int(clock.item(CLOCK.frame))
         if laws.due(frame):
             flying.do(stages & ~COMPLETE)
-            command = Command(*scratch.command[STATION.protected].tolist())
-            laws.decide(frame, sensors_of(scratch.sensors), command, Margins(*scratch.shown[1:].tolist()))
-            state.held[:] = laws.held
+            laws.decide(frame, sensors_of(sensors), Command(*protected.tolist()), Margins(*shown.tolist()[1:]))
+            held[:] = laws.held
             stages = COMPLETE
         block = min(frames - flown, laws.every - frame % laws.every)
-        flown += flying.fly(rows[flown:], block, stages)
+        flown += flying.fly(rows[flown * SIGNAL_COUNT :], block, stages)
         stages = WHOLE
     return flown
 

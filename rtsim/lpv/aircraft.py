@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.points import TrimPoint
+from rtsim.aircraft.variables import position, required_position
 from rtsim.errors import InputError, TrimError
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import packed
@@ -19,7 +20,6 @@ from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.tables import Form, Refresh, prepare_tables
-from rtsim.lpv.variables import position, required_position
 from rtsim.units import to_deg, to_kt
 
 if TYPE_CHECKING:

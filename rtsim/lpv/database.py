@@ -13,9 +13,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.profile import AircraftProfile, borrowed_profile
+from rtsim.aircraft.variables import Variable, with_roles
 from rtsim.errors import InputError
 from rtsim.lpv.validation import AXES, check_database
-from rtsim.lpv.variables import Variable
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -80,6 +81,8 @@ class Database:
     """Title, condition (weight, density), versions, hash of the aircraft data."""
     pilot: Mapping[str, PilotArrays] = field(default_factory=dict)
     """Pilot gains by name of the design."""
+    profile: AircraftProfile = field(default_factory=borrowed_profile, repr=False)
+    """What flies besides: nacelles, corridor, limits, systems, controls, weights; the XV-15's unless given."""
     _hash: str = field(default="", init=False, repr=False, compare=False)
 
     def __repr__(self) -> str:
@@ -92,7 +95,7 @@ class Database:
         )
 
     def __post_init__(self) -> None:
-        """Make every array read-only, contiguous float64 and check shapes and axes."""
+        """Make every array read-only, contiguous float64, give known variables their roles, check shapes and axes."""
         for item in fields(self):
             value = getattr(self, item.name)
             if isinstance(value, np.ndarray):
@@ -102,6 +105,9 @@ class Database:
                     array = array.copy()
                 array.setflags(write=False)
                 object.__setattr__(self, item.name, array)
+        object.__setattr__(self, "states", with_roles("state", self.states))
+        object.__setattr__(self, "inputs", with_roles("input", self.inputs))
+        object.__setattr__(self, "outputs", with_roles("output", self.outputs))
         check_database(self)
 
     @property
@@ -115,6 +121,13 @@ class Database:
         if not self._hash:
             object.__setattr__(self, "_hash", self._compute_hash())
         return self._hash
+
+    @property
+    def aircraft_hash(self) -> str:
+        """What tells this aircraft from another: the content hash, and the profile where it is not the XV-15's."""
+        if self.profile.is_xv15:
+            return self.content_hash
+        return hashlib.sha256(f"{self.content_hash}{self.profile.content_hash}".encode()).hexdigest()
 
     def _compute_hash(self) -> str:
         digest = hashlib.sha256()

@@ -1,4 +1,4 @@
-"""A database as the closed loop flies it: with the XV-15's variables in their order, flaps and rotor speed included."""
+"""A database as the closed loop flies it: the variables that its kernels know, in their order."""
 
 from __future__ import annotations
 
@@ -9,54 +9,63 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES, Variable
+from rtsim.aircraft.variables import AUXILIARY_INPUTS, FLAP_INPUTS, INPUTS, OUTPUTS, STATES, Variable, position
 from rtsim.errors import InputError
-from rtsim.lpv.database import Database
-from rtsim.lpv.variables import AUXILIARY_INPUTS, FLAP_INPUTS
+from rtsim.lpv.database import Database, FloatArray
 
 
 @functools.lru_cache(maxsize=4)
 def flown_database(database: Database, file: str | None = None) -> Database:
     """Give a database in the layout of the closed loop, whose kernels know the variables by their places.
 
+    Variables are found by name, in any order; outputs that nobody asks for are left out. Where inputs of flaps and
+    rotor speed are missing, they do nothing.
+
     Args:
         database: Any database.
         file: File it came from, for the message.
 
     Returns:
-        The same one where it has that layout; where it only lacks inputs of flaps and rotor speed, a copy in which they
-        do nothing.
+        The same one where it has that layout; else a copy in it.
 
     Raises:
-        InputError: It has other states, inputs or outputs: it serves in Python, but cannot be flown.
+        InputError: It lacks a variable, or has a state or input that the closed loop would not move: it serves in
+            Python, but cannot be flown.
     """
-    for kind, present, wanted in (
-        ("states", database.states, STATES),
-        ("inputs", tuple(v for v in database.inputs if v.name not in AUXILIARY_INPUTS), _without_auxiliary()),
-        ("outputs", database.outputs, OUTPUTS),
-    ):
-        found, needed = _with_units(present), _with_units(wanted)
-        if found != needed:
-            raise InputError(
-                "the database has other variables than the closed loop flies",
-                file=file,
-                key=kind,
-                value=found,
-                allowed=needed,
-                mend="give it these variables in this order, or use it in Python (rtsim.load_aircraft)",
-            )
-    if [variable.name for variable in database.inputs] == [variable.name for variable in INPUTS]:
+    needed = tuple(variable for variable in INPUTS if variable.name not in AUXILIARY_INPUTS)
+    _refuse(database.states, STATES, STATES, "states", file)
+    _refuse(database.inputs, needed, INPUTS, "inputs", file)
+    _refuse(database.outputs, OUTPUTS, None, "outputs", file)
+    pairs = ((database.states, STATES), (database.inputs, INPUTS), (database.outputs, OUTPUTS))
+    if all([v.name for v in have] == [v.name for v in want] for have, want in pairs):
         return database
-    places = {variable.name: place for place, variable in enumerate(database.inputs)}
-    arrays: dict[str, Any] = {}
-    for name in ("u_ref", "B", "D"):
-        old = getattr(database, name)
-        new = np.zeros((*old.shape[:-1], len(INPUTS)))
-        for place, variable in enumerate(INPUTS):
-            if variable.name in places:
-                new[..., place] = old[..., places[variable.name]]
-        arrays[name] = new
-    return replace(database, inputs=INPUTS, **arrays)
+    x, u, y = (np.array([position(have, variable.name) for variable in want]) for have, want in pairs)
+
+    def pick(name: str, *places: Any) -> FloatArray:
+        """An array with its last axes in the closed loop's order; zeros where a variable is missing."""
+        array = getattr(database, name)
+        for axis, place in enumerate(places, start=array.ndim - len(places)):
+            array = np.take(array, np.maximum(place, 0), axis=axis)
+            missing = [slice(None)] * array.ndim
+            missing[axis] = place < 0
+            array[tuple(missing)] = 0.0
+        return np.asarray(array)
+
+    return replace(
+        database,
+        states=STATES,
+        inputs=INPUTS,
+        outputs=OUTPUTS,
+        x_ref=pick("x_ref", x),
+        u_ref=pick("u_ref", u),
+        y_ref=pick("y_ref", y),
+        xdot_ref=pick("xdot_ref", x),
+        df_dnacelle=pick("df_dnacelle", x),
+        A=pick("A", x, x),
+        B=pick("B", x, u),
+        C=pick("C", y, x),
+        D=pick("D", y, u),
+    )
 
 
 def moves_flaps(database: Database) -> bool:
@@ -77,9 +86,32 @@ def turns_rotors(database: Database) -> bool:
     return "rotor_speed" in {variable.name for variable in database.inputs}
 
 
-def _with_units(variables: Sequence[Variable]) -> str:
-    return ", ".join(f"{variable.name} [{variable.unit or '-'}]" for variable in variables)
-
-
-def _without_auxiliary() -> tuple[Variable, ...]:
-    return tuple(variable for variable in INPUTS if variable.name not in AUXILIARY_INPUTS)
+def _refuse(
+    present: Sequence[Variable],
+    needed: Sequence[Variable],
+    known: Sequence[Variable] | None,
+    kind: str,
+    file: str | None,
+) -> None:
+    """Refuse what is missing, has another unit, or is not known."""
+    found = {variable.name: variable for variable in present}
+    for variable in needed:
+        there = found.get(variable.name)
+        if there is None:
+            raise InputError(
+                f"the closed loop needs '{variable.name}' [{variable.unit or '-'}], which the database lacks",
+                file=file, key=kind, mend="add it, or use the database in Python (rtsim.load_aircraft)",
+            )  # fmt: skip
+        if there.unit != variable.unit:
+            raise InputError(
+                f"'{variable.name}' has another unit than the closed loop reckons in",
+                file=file, key=kind, value=there.unit, allowed=variable.unit or "no unit", mend="convert it",
+            )  # fmt: skip
+    names = {variable.name for variable in known or present}
+    for variable in present:
+        if variable.name not in names:
+            raise InputError(
+                f"the closed loop does not know '{variable.name}' (role {variable.role}) and would leave it still",
+                file=file, key=kind, allowed=", ".join(item.name for item in known or present),
+                mend="leave it out, or use the database in Python (rtsim.load_aircraft)",
+            )  # fmt: skip

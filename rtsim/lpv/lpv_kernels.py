@@ -18,29 +18,13 @@ from rtsim.lpv.schedule_kernels import (
     FORM_LAYERED,
     FORM_PLAIN,
     FORM_STITCHED,
-    R_ALTITUDE,
-    R_AUXILIARY,
-    R_AUXILIARY_COLUMN,
-    R_FORM,
-    R_INPUTS,
-    R_NACELLE_ACCELERATION,
-    R_NACELLE_RATE,
-    R_OUTPUT_ROWS,
-    R_OUTPUTS,
-    R_PITCH,
-    R_Q,
-    R_REFRESH,
-    R_ROWS,
-    R_STATES,
-    R_U,
-    R_W,
     REFRESH_EVERY_STAGE,
     REFRESH_ONCE,
     REFRESH_REFERENCE,
     W_BLEND,
     W_FLAGS,
     FloatArray,
-    IntArray,
+    LpvRoles,
     LpvTables,
     auxiliary_act,
     blend,
@@ -91,54 +75,55 @@ def _apply(
     Views come from the caller: making them here costs as much as the sums.
     """
     roles = tables.roles
-    states = roles[R_STATES]
-    rows = roles[R_ROWS]
-    of_states = tables.state_columns.shape[0]
+    states = roles.states
+    rows = roles.rows
+    of_states, always = roles.state_columns, roles.auxiliary_column
     for c in range(of_states):
         column = tables.state_columns[c]
         deviation[c] = x[column] - reference[column]
     for c in range(of_inputs):
         column = tables.input_columns[c]
         deviation[of_states + c] = u[column] - reference[states + column]
+    # Row by row over the columns that always act: their number is known when this is compiled.
     for k in range(rows):
-        total[k] = columns[k]
-    position = rows
-    for c in range(of_states + of_inputs):
-        d = deviation[c]
+        row = columns[k]
+        for c in range(of_states + always):
+            row += columns[rows * (1 + c) + k] * deviation[c]
+        total[k] = row
+    for c in range(of_states + always, of_states + of_inputs):
         for k in range(rows):
-            total[k] += columns[position + k] * d
-        position += rows
+            total[k] += columns[rows * (1 + c) + k] * deviation[c]
     for k in range(states):
         xdot[k] = 0.0
     for k in range(tables.rows.shape[0]):
         xdot[tables.rows[k]] = total[k]
-    if roles[R_FORM] != FORM_PLAIN:
+    if roles.form != FORM_PLAIN:
         _add_rigid_body(roles, x, xdot)
 
 
 @inner_kernel
-def _add_rigid_body(roles: IntArray, x: FloatArray, xdot: FloatArray) -> None:
+def _add_rigid_body(roles: LpvRoles, x: FloatArray, xdot: FloatArray) -> None:
     """Add gravity, Coriolis and kinematics of the symmetric plane (body axes, z down, altitude up)."""
-    u = x[roles[R_U]]
-    w = x[roles[R_W]]
-    q = x[roles[R_Q]]
-    pitch = x[roles[R_PITCH]]
+    u = x[roles.u]
+    w = x[roles.w]
+    q = x[roles.q]
+    pitch = x[roles.pitch]
     sine = math.sin(pitch)
     cosine = math.cos(pitch)
-    xdot[roles[R_U]] += -GRAVITY * sine - q * w
-    xdot[roles[R_W]] += GRAVITY * cosine + q * u
-    xdot[roles[R_PITCH]] += q
-    xdot[roles[R_ALTITUDE]] += u * sine - w * cosine
+    xdot[roles.u] += -GRAVITY * sine - q * w
+    xdot[roles.w] += GRAVITY * cosine + q * u
+    xdot[roles.pitch] += q
+    xdot[roles.altitude] += u * sine - w * cosine
 
 
 @inner_kernel
 def _acting(tables: LpvTables, u: FloatArray) -> tuple[int, int]:
     """How many active columns of B are needed, and the length of a cell up to the last of them."""
-    of_inputs = tables.input_columns.shape[0]
+    of_inputs = tables.roles.input_columns
     block = tables.cells.shape[3]
     if not auxiliary_act(tables, u):
-        needed = tables.roles[R_AUXILIARY_COLUMN]
-        block -= (of_inputs - needed) * tables.roles[R_ROWS]
+        needed = tables.roles.auxiliary_column
+        block -= (of_inputs - needed) * tables.roles.rows
         of_inputs = needed
     return of_inputs, block
 
@@ -159,7 +144,7 @@ def lpv_derivative(
         xdot: Receives the state derivative (nx,).
         work: Scratch of ``work_size(tables)`` values.
     """
-    inputs_end = W_BLEND + tables.roles[R_STATES] + tables.roles[R_INPUTS]
+    inputs_end = W_BLEND + tables.roles.states + tables.roles.inputs
     of_inputs, block = _acting(tables, u)
     sums, scratch = rows_at(tables), scratch_at(tables)
     i, j = locate(tables, x, u, nacelle_angle, work)
@@ -192,33 +177,34 @@ def lpv_outputs(
         work: Scratch of ``work_size(tables)`` values.
     """
     roles = tables.roles
-    states = roles[R_STATES]
-    inputs = roles[R_INPUTS]
-    outputs = roles[R_OUTPUTS]
-    rows = roles[R_OUTPUT_ROWS]
+    states = roles.states
+    inputs = roles.inputs
+    outputs = roles.outputs
+    rows = roles.output_rows
     i, j = locate(tables, x, u, nacelle_angle, work)
     block = tables.output_cells.shape[3]
-    acting = inputs if auxiliary_act(tables, u) else roles[R_AUXILIARY]
+    acting = inputs if auxiliary_act(tables, u) else roles.auxiliary
     block -= (inputs - acting) * rows
     model = work[W_BLEND : W_BLEND + max(block, states + inputs)]
     blend(tables.cells, i, j, states + inputs, work, model)
     deviation = work[scratch_at(tables) :]
     for k in range(states):
         deviation[k] = x[k] - model[k]
-    if roles[R_ALTITUDE] >= 0:
-        deviation[roles[R_ALTITUDE]] = 0.0
+    if roles.altitude >= 0:
+        deviation[roles.altitude] = 0.0
     for k in range(inputs):
         deviation[states + k] = u[k] - model[states + k]
     blend(tables.output_cells, i, j, block, work, model)
     total = work[rows_at(tables) : rows_at(tables) + rows]
+    always = states + roles.auxiliary
     for k in range(rows):
-        total[k] = model[k]
-    position = rows
-    for column in range(states + acting):
-        d = deviation[column]
+        row = model[k]
+        for column in range(always):
+            row += model[rows * (1 + column) + k] * deviation[column]
+        total[k] = row
+    for column in range(always, states + acting):
         for k in range(rows):
-            total[k] += model[position + k] * d
-        position += rows
+            total[k] += model[rows * (1 + column) + k] * deviation[column]
     for k in range(outputs):
         y[k] = total[k]
 
@@ -241,11 +227,11 @@ def lpv_step(
         work: Scratch of ``work_size(tables)`` values.
     """
     roles = tables.roles
-    states = roles[R_STATES]
-    inputs = roles[R_INPUTS]
-    refresh = roles[R_REFRESH]
-    rate = roles[R_NACELLE_RATE]
-    acceleration = roles[R_NACELLE_ACCELERATION]
+    states = roles.states
+    inputs = roles.inputs
+    refresh = roles.refresh
+    rate = roles.nacelle_rate
+    acceleration = roles.nacelle_acceleration
     of_inputs, block = _acting(tables, u)
     scratch = scratch_at(tables)
     model = work[W_BLEND : W_BLEND + block]

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.aircraft.variables import SCHEDULING_SPEED
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.packed import Size
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -43,36 +43,10 @@ FLAG_NACELLE = 4
 FLAG_NO_TRIM = 8
 """Bit of the flags: a neighbouring grid point has no trim and was filled from the nearest airspeed that has one."""
 
-ALPHA_SPEED = SCHEDULING_SPEED
-"""V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
 GAP_NONE = math.radians(1.0)
 """Layers whose angles of attack differ by less than this are not blended [rad]."""
 GAP_FULL = math.radians(2.0)
 """From this difference on they are blended in full; between the two the blend fades in [rad]."""
-
-# positions in LpvTables.roles
-R_FORM = 0
-R_LEVEL = 1
-R_U = 2
-R_W = 3
-R_Q = 4
-R_PITCH = 5
-R_ALTITUDE = 6
-R_NACELLE_RATE = 7
-R_NACELLE_ACCELERATION = 8
-R_STATES = 9
-R_INPUTS = 10
-R_OUTPUTS = 11
-R_ROWS = 12
-R_OUTPUT_ROWS = 13
-R_REFRESH = 14
-R_GUST_U = 15
-R_GUST_W = 16
-R_AUXILIARY = 17
-"""Number of the first of the last inputs that are zero in most frames; the number of inputs where there are none."""
-R_AUXILIARY_COLUMN = 18
-"""The same, counted in active columns of B."""
-R_COUNT = 19
 
 # positions in the work array; the sections after the last are laid out by `work_size`
 W_FLAGS = 0
@@ -81,6 +55,42 @@ W_CORNER = 2
 W_LAYER_SHARE = 6
 W_MAX_LAYERS = 8
 W_BLEND = W_LAYER_SHARE + W_MAX_LAYERS
+
+
+class LpvRoles(NamedTuple):
+    """How a database is flown: sizes and positions are constants to the compiler, the rest is read."""
+
+    form: int
+    """``FORM_*``."""
+    level: int
+    """The layer of level flight."""
+    refresh: int
+    """``REFRESH_*``."""
+    u: Size
+    """Positions of the rigid body in the state; -1 where there is none."""
+    w: Size
+    q: Size
+    pitch: Size
+    altitude: Size
+    nacelle_rate: Size
+    """Positions among the inputs; -1 where there is none."""
+    nacelle_acceleration: Size
+    gust_u: Size
+    gust_w: Size
+    states: Size
+    """How many there are."""
+    inputs: Size
+    outputs: Size
+    rows: Size
+    """Active rows and rows of the outputs, padded."""
+    output_rows: Size
+    state_columns: Size
+    """Active columns of A and of B."""
+    input_columns: Size
+    auxiliary: Size
+    """The first of the last inputs, which are zero in most frames; the number of inputs where there are none."""
+    auxiliary_column: Size
+    """The same, counted in active columns of B."""
 
 
 class LpvTables(NamedTuple):
@@ -104,8 +114,10 @@ class LpvTables(NamedTuple):
     """State number of each active column of A."""
     input_columns: IntArray
     """Input number of each active column of B."""
-    roles: IntArray
-    """Form, sizes and positions of the variables that have a meaning here (``R_*``)."""
+    alpha_speed: float
+    """V0 of the scheduling angle of attack [m/s]: keeps it defined in hover."""
+    roles: LpvRoles
+    """Form, sizes and positions of the variables that have a meaning here."""
 
 
 @inner_kernel
@@ -131,7 +143,7 @@ def scratch_at(tables: LpvTables) -> int:
     Returns:
         The position.
     """
-    return int(rows_at(tables) + max(tables.roles[R_ROWS], tables.roles[R_OUTPUT_ROWS]))
+    return int(rows_at(tables) + max(tables.roles.rows, tables.roles.output_rows))
 
 
 @inner_kernel
@@ -144,7 +156,7 @@ def work_size(tables: LpvTables) -> int:
     Returns:
         The number of float64 values.
     """
-    return int(scratch_at(tables) + 4 * tables.roles[R_STATES] + 2 * tables.roles[R_INPUTS])
+    return int(scratch_at(tables) + 4 * tables.roles.states + 2 * tables.roles.inputs)
 
 
 @inner_kernel
@@ -156,7 +168,7 @@ def auxiliary_act(tables: LpvTables, u: FloatArray) -> bool:
         u: Total input (nu,).
     """
     act = False
-    for k in range(tables.roles[R_AUXILIARY], tables.roles[R_INPUTS]):
+    for k in range(tables.roles.auxiliary, tables.roles.inputs):
         act = act or u[k] != 0.0
     return act
 
@@ -196,7 +208,7 @@ def _layer_step(alpha: float, here: float, beyond: float) -> float:
 
 
 @inner_kernel
-def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
+def scheduling_alpha(u: float, w: float, sine: float, cosine: float, speed: float) -> float:
     """Angle of attack as used for scheduling: with a headwind of V0 added, so that it is defined in hover.
 
     In rearward flight the headwind grows by the rearward speed; the angle then stays continuous at -V0, where it would
@@ -207,11 +219,12 @@ def scheduling_alpha(u: float, w: float, sine: float, cosine: float) -> float:
         w: Air-relative velocity along body z [m/s].
         sine: Sine of the pitch attitude.
         cosine: Cosine of the pitch attitude.
+        speed: V0 [m/s].
 
     Returns:
         The angle [rad]; the pitch attitude in any level flight.
     """
-    headwind = ALPHA_SPEED + max(0.0, -(u * cosine + w * sine))
+    headwind = speed + max(0.0, -(u * cosine + w * sine))
     return math.atan2(w + headwind * sine, u + headwind * cosine)
 
 
@@ -235,13 +248,13 @@ def locate(
         Numbers of the airspeed and nacelle intervals.
     """
     roles = tables.roles
-    u = x[roles[R_U]]
-    w = x[roles[R_W]]
-    if roles[R_GUST_U] >= 0:
-        u += inputs[roles[R_GUST_U]]
-    if roles[R_GUST_W] >= 0:
-        w += inputs[roles[R_GUST_W]]
-    pitch = x[roles[R_PITCH]]
+    u = x[roles.u]
+    w = x[roles.w]
+    if roles.gust_u >= 0:
+        u += inputs[roles.gust_u]
+    if roles.gust_w >= 0:
+        w += inputs[roles.gust_w]
+    pitch = x[roles.pitch]
     sine = math.sin(pitch)
     cosine = math.cos(pitch)
     airspeed = u * cosine + w * sine
@@ -281,13 +294,13 @@ def locate(
     work[W_FLAGS] = flags
 
     layers = tables.alpha.shape[2]
-    level = roles[R_LEVEL]
+    level = roles.level
     for layer in range(layers):
         work[W_LAYER_SHARE + layer] = 0.0
     if layers == 1:
         work[W_LAYER_SHARE] = 1.0
         return i, j
-    alpha = scheduling_alpha(u, w, sine, cosine)
+    alpha = scheduling_alpha(u, w, sine, cosine, tables.alpha_speed)
     work[W_ALPHA] = alpha
     # Walk outwards from the level layer. `gone` is the share that has left the layer before; the decelerating side
     # gets its part of what the accelerating side left, so that the shares always add up to one.

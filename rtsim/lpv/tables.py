@@ -8,13 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.errors import InputError
-from rtsim.kernels.packed import packed
-from rtsim.lpv import schedule_kernels as kernels
-from rtsim.lpv.database import Database
-from rtsim.lpv.schedule_kernels import LpvTables
-from rtsim.lpv.variables import (
-    AUXILIARY_INPUTS,
+from rtsim.aircraft.variables import (
     GUST_INPUTS,
     NACELLE_INPUTS,
     RIGID_BODY_STATES,
@@ -22,6 +16,11 @@ from rtsim.lpv.variables import (
     position,
     required_position,
 )
+from rtsim.errors import InputError
+from rtsim.kernels.packed import Size, packed
+from rtsim.lpv import schedule_kernels as kernels
+from rtsim.lpv.database import Database
+from rtsim.lpv.schedule_kernels import LpvRoles, LpvTables
 from rtsim.units import GRAVITY
 
 FloatArray = npt.NDArray[np.float64]
@@ -65,21 +64,22 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
     layers = slice(None) if form == "layered" else slice(level, level + 1)
     x_ref, u_ref = database.x_ref[layers], database.u_ref[layers]
     A, B, xdot_ref = database.A[layers].copy(), database.B[layers].copy(), database.xdot_ref[layers].copy()
-    roles = _roles(database, number, level if form == "layered" else 0)
     if form != "plain":
         _subtract_rigid_body(database, x_ref, A, xdot_ref)
-    altitude = roles[kernels.R_ALTITUDE]
+    altitude = position(database.states, "altitude")
     if altitude >= 0:
         # The altitude has no trim value: the air is the same at every height and the ground is far.
         A[..., altitude] = 0.0
 
     rows, state_columns, input_columns = _active(A, B, xdot_ref)
-    padded = _padded(rows.size)
-    roles[kernels.R_ROWS] = padded
-    roles[kernels.R_OUTPUT_ROWS] = _padded(len(database.outputs))
-    roles[kernels.R_REFRESH] = REFRESHES[refresh]
-    roles[kernels.R_AUXILIARY] = _first_auxiliary(database)
-    roles[kernels.R_AUXILIARY_COLUMN] = np.count_nonzero(input_columns < roles[kernels.R_AUXILIARY])
+    roles = _roles(
+        database,
+        number,
+        REFRESHES[refresh],
+        level if form == "layered" else 0,
+        (rows, state_columns, input_columns),
+    )
+    padded = roles.rows
     cells = np.concatenate(
         [
             x_ref,
@@ -92,7 +92,7 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
     )
     output_cells = np.concatenate(
         [
-            _columns(matrix, int(roles[kernels.R_OUTPUT_ROWS]))
+            _columns(matrix, roles.output_rows)
             for matrix in (database.y_ref[layers][..., None], database.C[layers], database.D[layers])
         ],
         axis=-1,
@@ -108,9 +108,19 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
             rows=rows,
             state_columns=state_columns,
             input_columns=input_columns,
+            alpha_speed=scheduling_speed(database),
             roles=roles,
         )
     )
+
+
+def scheduling_speed(database: Database) -> float:
+    """V0 of the scheduling angle of attack [m/s].
+
+    Args:
+        database: The aircraft.
+    """
+    return database.profile.dimensions.number("scheduling_speed_m_s", low=0.1, high=100.0)
 
 
 def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
@@ -125,37 +135,47 @@ def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
     """
     u, w, pitch = (x[..., required_position(database.states, name, "scheduling")] for name in SCHEDULING_STATES)
     sine, cosine = np.sin(pitch), np.cos(pitch)
-    headwind = kernels.ALPHA_SPEED + np.maximum(0.0, -(u * cosine + w * sine))
+    headwind = scheduling_speed(database) + np.maximum(0.0, -(u * cosine + w * sine))
     return np.asarray(np.arctan2(w + headwind * sine, u + headwind * cosine))
 
 
-def _roles(database: Database, form: int, level: int) -> npt.NDArray[np.int64]:
-    roles = np.zeros(kernels.R_COUNT, dtype=np.int64)
-    roles[kernels.R_FORM], roles[kernels.R_LEVEL] = form, level
-    states = (kernels.R_U, kernels.R_W, kernels.R_Q, kernels.R_PITCH, kernels.R_ALTITUDE)
-    for place, name in zip(states, RIGID_BODY_STATES, strict=True):
-        needed = form != kernels.FORM_PLAIN or name in SCHEDULING_STATES
-        purpose = "the stitched form" if name not in SCHEDULING_STATES else "scheduling"
-        if needed:
-            roles[place] = required_position(database.states, name, purpose)
+def _roles(
+    database: Database, form: int, refresh: int, level: int, active: tuple[npt.NDArray[np.int64], ...]
+) -> LpvRoles:
+    rigid = {}
+    for name in RIGID_BODY_STATES:
+        if name in SCHEDULING_STATES:
+            rigid[name] = required_position(database.states, name, "scheduling")
+        elif form != kernels.FORM_PLAIN:
+            rigid[name] = required_position(database.states, name, "the stitched form")
         else:
-            roles[place] = position(database.states, name)
-    motion = (kernels.R_NACELLE_RATE, kernels.R_NACELLE_ACCELERATION)
-    for place, name in zip(motion, NACELLE_INPUTS, strict=True):
-        roles[place] = position(database.inputs, name)
-    for place, name in zip((kernels.R_GUST_U, kernels.R_GUST_W), GUST_INPUTS, strict=True):
-        # The paper's plain form is scheduled by the state alone.
-        roles[place] = -1 if form == kernels.FORM_PLAIN else position(database.inputs, name)
-    roles[kernels.R_STATES] = len(database.states)
-    roles[kernels.R_INPUTS] = len(database.inputs)
-    roles[kernels.R_OUTPUTS] = len(database.outputs)
-    return roles
+            rigid[name] = position(database.states, name)
+    # The paper's plain form is scheduled by the state alone.
+    gusts = {name: -1 if form == kernels.FORM_PLAIN else position(database.inputs, name) for name in GUST_INPUTS}
+    motion = {name: position(database.inputs, name) for name in NACELLE_INPUTS}
+    rows, state_columns, input_columns = active
+    auxiliary = _first_auxiliary(database)
+    sizes: dict[str, int] = {
+        **rigid,
+        **gusts,
+        **motion,
+        "states": len(database.states),
+        "inputs": len(database.inputs),
+        "outputs": len(database.outputs),
+        "rows": _padded(rows.size),
+        "output_rows": _padded(len(database.outputs)),
+        "state_columns": state_columns.size,
+        "input_columns": input_columns.size,
+        "auxiliary": auxiliary,
+        "auxiliary_column": int(np.count_nonzero(input_columns < auxiliary)),
+    }
+    return LpvRoles(form=form, level=level, refresh=refresh, **{name: Size(value) for name, value in sizes.items()})
 
 
 def _first_auxiliary(database: Database) -> int:
     """Number of the first of the last inputs that are zero in most frames and in every trim."""
     first = len(database.inputs)
-    while first > 0 and database.inputs[first - 1].name in AUXILIARY_INPUTS:
+    while first > 0 and database.inputs[first - 1].role in ("flap", "drive"):
         if np.any(database.u_ref[..., first - 1]):
             break
         first -= 1

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import SCHEDULING_STATES, position
 from rtsim.errors import InputError
-from rtsim.lpv.variables import SCHEDULING_STATES, position
 
 if TYPE_CHECKING:
     from rtsim.lpv.database import Database

@@ -102,7 +102,7 @@ METRICS = (
            objective="flapping_rms"),
     Metric("flapping_integral_deg_s", "deg s", "integral of cyclic flapping", lambda s: s.flapping * s.dt,
            (FLIGHT, SEARCH), flight="flapping_deg.integral_deg_s", objective="flapping_integral"),
-    Metric("flapping_over_s", "s", "time with flapping beyond its stop of 12 deg", lambda s: s.flapping_over, (TRIAL,)),
+    Metric("flapping_over_s", "s", "time with flapping beyond its stop", lambda s: s.flapping_over, (TRIAL,)),
     Metric("airspeed_final_kt", "kn", "airspeed of the last frame", lambda s: s.airspeed, flight="airspeed_kt.final"),
     Metric("airspeed_rms_error_kt", "kn",
            "root mean square, over all frames, of true airspeed minus its reference behind a 1.5 rad/s filter",
@@ -130,6 +130,8 @@ METRICS = (
            flight="pitch_deg.max"),
     Metric("pitch_peak_deg", "deg", "largest pitch attitude, up or down",
            lambda s: max(abs(s.pitch_least), abs(s.pitch_largest)), (TRIAL,)),
+    Metric("pitch_beyond_deg", "deg", "largest pitch attitude beyond its limit, negative inside",
+           lambda s: max(abs(s.pitch_least), abs(s.pitch_largest)) - s.pitch_limit, ()),
     Metric("pitch_excursion_deg", "deg", "largest minus smallest pitch attitude",
            lambda s: s.pitch_largest - s.pitch_least, (), objective="pitch_excursion"),
     Metric("pitch_rate_rms_deg_s", "deg/s", "root mean square of the pitch rate",
@@ -166,6 +168,8 @@ METRICS = (
            objective="energy"),
     Metric("load_factor_max", "", "largest load factor", lambda s: s.load_largest, (TRIAL,)),
     Metric("load_factor_min", "", "smallest load factor", lambda s: s.load_least, (TRIAL,)),
+    Metric("load_factor_beyond", "", "largest load factor beyond its limits, negative inside",
+           lambda s: max(s.load_largest - s.load_limit_max, s.load_limit_min - s.load_least), ()),
     Metric("corridor_activations", "", "times the law acted for the corridor's sake, those within 0.5 s merged",
            lambda s: s.activations, (TRIAL,)),
     Metric("corridor_active_s", "s", "time the law acted for the corridor's sake", lambda s: s.corridor_active,
@@ -204,6 +208,7 @@ CONTROL = Places(
 SUM = Places(
     # What the flight is judged by, set before it.
     "flapping_limit", "torque_cruise", "torque_takeoff", "takeoff_nacelle", "takeoff_airspeed",
+    "load_limit_max", "load_limit_min", "pitch_limit",
     # How it ended, set after it.
     "ended", "yielded",
     "frames", "time",

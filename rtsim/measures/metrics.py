@@ -13,13 +13,14 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.profile import AircraftProfile
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.measures import metric_kernels as kernels
 from rtsim.measures.metric_kernels import CONTROL, FLIGHT, METRICS, SEARCH, SUM, TRIAL, VALUE, Metric
 from rtsim.places import Places
 from rtsim.programme import Programme
-from rtsim.protection.limits import load_limits, protection_data
+from rtsim.protection.limits import load_limits
 from rtsim.units import to_deg
 
 BoolArray = npt.NDArray[np.bool_]
@@ -173,10 +174,15 @@ def objective_value(figures: FlightFigures, objective: str) -> float:
     return float(figures.numbers[_OBJECTIVE_PLACES[objective]])
 
 
-def new_sums() -> FloatArray:
-    """What a flight is measured into: nothing summed up yet, the limits it is judged by in their places."""
-    limits, sums = load_limits(), np.zeros(SUM.size)
-    sums[SUM.flapping_limit] = to_deg(limits.flapping)
+def new_sums(profile: AircraftProfile | None = None) -> FloatArray:
+    """What a flight is measured into: nothing summed up yet, the limits it is judged by in their places.
+
+    Args:
+        profile: The aircraft; None: the XV-15.
+    """
+    limits, sums = load_limits(profile), np.zeros(SUM.size)
+    sums[SUM.flapping_limit], sums[SUM.pitch_limit] = to_deg(limits.flapping), to_deg(limits.pitch)
+    sums[SUM.load_limit_max], sums[SUM.load_limit_min] = limits.load_factor_max, limits.load_factor_min
     sums[SUM.torque_cruise : SUM.torque_cruise + len(limits.torque)] = limits.torque
     return sums
 
@@ -204,7 +210,13 @@ def _named(values: FloatArray, places: Places) -> dict[str, float]:
 
 
 def measured(
-    rows: FloatArray, programme: Programme, dt: float, *, ended: bool = False, yielded: bool = False
+    rows: FloatArray,
+    programme: Programme,
+    dt: float,
+    *,
+    profile: AircraftProfile | None = None,
+    ended: bool = False,
+    yielded: bool = False,
 ) -> FloatArray:
     """Measure a flight that was recorded.
 
@@ -212,13 +224,14 @@ def measured(
         rows: The frame history, shape (frames, SIGNAL_COUNT), at least one frame.
         programme: What it was asked to do.
         dt: Length of a frame [s].
+        profile: The aircraft; None: the XV-15.
         ended: It ended by itself.
         yielded: Its pilot gave up his plan.
 
     Returns:
         All its metrics, places ``VALUE``.
     """
-    sums = new_sums()
+    sums = new_sums(profile)
     points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
     kernels.measure_rows(np.require(rows, requirements=("C", "W")), points, dt, sums)
     sums[SUM.ended], sums[SUM.yielded] = ended, yielded
@@ -242,14 +255,12 @@ def violations(numbers: FloatArray) -> dict[str, BoolArray]:
     Args:
         numbers: Metrics, shape (flights, VALUE.size).
     """
-    limits = protection_data()["limits"]
-    load = numbers[:, VALUE.load_factor_max], numbers[:, VALUE.load_factor_min]
     return {
         "corridor": numbers[:, VALUE.exceedances] > 0.0,
         "flapping": numbers[:, VALUE.flapping_over_s] > 0.0,
         "torque": numbers[:, VALUE.torque_over_s] > 0.0,
-        "load_factor": (load[0] > limits["load_factor_max"]) | (load[1] < limits["load_factor_min"]),
-        "pitch": numbers[:, VALUE.pitch_peak_deg] > limits["pitch_deg"],
+        "load_factor": numbers[:, VALUE.load_factor_beyond] > 0.0,
+        "pitch": numbers[:, VALUE.pitch_beyond_deg] > 0.0,
         "control": numbers[:, VALUE.completed] == 0.0,
         "height": numbers[:, VALUE.height_lost_m] > VACUOUS_HEIGHT,
     }

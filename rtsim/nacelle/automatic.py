@@ -6,10 +6,11 @@ The simulation calls the kernels; :class:`ScheduledNacelle` wraps the same kerne
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.aircraft.profile import AircraftProfile
 from rtsim.command import Command, Sensors
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
@@ -26,8 +27,6 @@ from rtsim.units import deg, kt, to_deg
 
 NOMINAL_RATE = deg(7.5)
 """Rate of the XV-15's conversion actuators [rad/s] (TM 81244)."""
-LARGEST_RATE = deg(12.0)
-"""Largest rate that may be commanded [rad/s], the paper's peak."""
 _ROUNDING = 1e-9
 
 
@@ -61,14 +60,17 @@ class NacelleSchedule:
         return float(np.interp(airspeed, self.airspeed, self.nacelle))
 
 
-def centre_line_schedule(corridor: str = "design", *, step_deg: float = 5.0) -> NacelleSchedule:
+def centre_line_schedule(
+    corridor: str = "design", *, step_deg: float = 5.0, profile: AircraftProfile | None = None
+) -> NacelleSchedule:
     """The centre line of a corridor, from helicopter to airplane mode.
 
     Args:
         corridor: Name of the corridor.
         step_deg: Distance of the corners in nacelle angle [deg].
+        profile: The aircraft; None: the XV-15.
     """
-    centre = load_corridor(corridor).centre_speed
+    centre = load_corridor(corridor, profile).centre_speed
     corners: list[tuple[float, float]] = []
     for degrees in np.arange(90.0, -step_deg / 2.0, -step_deg):
         angle = deg(max(float(degrees), 0.0))
@@ -103,10 +105,10 @@ def programme_schedule(programme: Programme) -> NacelleSchedule:
 class AutomaticNacelle:
     """Settings of the automatic nacelle control. SI and radians."""
 
-    schedule: NacelleSchedule = field(default_factory=centre_line_schedule)
-    """Nacelle angle over airspeed."""
+    schedule: NacelleSchedule | None = None
+    """Nacelle angle over airspeed; None: the centre line of the aircraft's design corridor."""
     rate: float = NOMINAL_RATE
-    """Largest rate [rad/s], up to :data:`LARGEST_RATE`."""
+    """Largest rate [rad/s], up to what the aircraft's actuators may be assigned."""
     acceleration: float = deg(15.0)
     """Largest change of the rate per second [rad/s^2]."""
     detents: bool = False
@@ -123,25 +125,32 @@ class AutomaticNacelle:
     """Gain where there are detents [1/s]: the nacelles must arrive before the schedule has left the zone."""
 
     def __post_init__(self) -> None:
-        """Refuse rates the actuators cannot follow (:class:`InputError`)."""
-        if not 0.0 < self.rate <= LARGEST_RATE + _ROUNDING:
+        """Refuse what is not positive (:class:`InputError`)."""
+        for name in ("rate", "acceleration", "gain", "correction", "detent_gain"):
+            if not (getattr(self, name) > 0.0 and np.isfinite(getattr(self, name))):
+                raise InputError("must be positive", key=f"nacelle {name}", value=getattr(self, name))
+
+    def tables(self, profile: AircraftProfile | None = None) -> AutomaticTables:
+        """The settings as the kernels take them.
+
+        Args:
+            profile: The aircraft, whose detents count and whose centre line is followed where no schedule is given;
+                None: the XV-15.
+        """
+        nacelle = load_nacelle_tables(profile)
+        if self.rate > nacelle.assigned_rate + _ROUNDING:
             raise InputError(
                 "is out of range",
                 key="nacelle rate",
                 value=round(to_deg(self.rate), 6),
-                allowed=f"more than 0, up to {to_deg(LARGEST_RATE):g} deg/s",
+                allowed=f"more than 0, up to {to_deg(nacelle.assigned_rate):g} deg/s",
             )
-        for name in ("acceleration", "gain", "correction", "detent_gain"):
-            if not (getattr(self, name) > 0.0 and np.isfinite(getattr(self, name))):
-                raise InputError("must be positive", key=f"nacelle {name}", value=getattr(self, name))
-
-    def tables(self) -> AutomaticTables:
-        """The settings as the kernels take them."""
-        detents = load_nacelle_tables().detents if self.detents else np.zeros(0)
+        detents = nacelle.detents if self.detents else np.zeros(0)
+        schedule = centre_line_schedule(profile=profile) if self.schedule is None else self.schedule
         return AutomaticTables(
             active=1,
-            airspeed=_array(self.schedule.airspeed),
-            nacelle=_array(self.schedule.nacelle),
+            airspeed=_array(schedule.airspeed),
+            nacelle=_array(schedule.nacelle),
             rate=float(self.rate),
             acceleration=float(self.acceleration),
             gain=float(self.detent_gain if self.detents else self.gain),
@@ -206,7 +215,6 @@ def _array(values: tuple[float, ...]) -> FloatArray:
 
 
 __all__ = [
-    "LARGEST_RATE",
     "NOMINAL_RATE",
     "AutomaticNacelle",
     "NacelleSchedule",

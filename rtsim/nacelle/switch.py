@@ -5,12 +5,11 @@ The simulation calls the kernels directly; these objects wrap the same kernels f
 
 from __future__ import annotations
 
-import tomllib
-from functools import cache
-from importlib import resources
+from functools import lru_cache
 
 import numpy as np
 
+from rtsim.aircraft.profile import AircraftProfile, xv15_profile
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.nacelle.nacelle_kernels import (
@@ -28,28 +27,34 @@ from rtsim.nacelle.nacelle_kernels import (
 from rtsim.units import deg, to_deg
 
 
-@cache
-def load_nacelle_tables(*, extended_aft_travel: bool = False) -> NacelleTables:
+@lru_cache(maxsize=8)
+def load_nacelle_tables(profile: AircraftProfile | None = None, *, extended_aft_travel: bool = False) -> NacelleTables:
     """Read the data of the nacelles.
 
     Args:
-        extended_aft_travel: Let the nacelles go to 95 deg instead of 90.
+        profile: The aircraft; None: the XV-15.
+        extended_aft_travel: Let the nacelles go to the end of their travel beyond helicopter mode.
+
+    Raises:
+        InputError: A value is missing or out of range.
     """
-    text = resources.files("rtsim.aircraft.xv15").joinpath("data", "nacelle.toml").read_text(encoding="utf-8")
-    data = tomllib.loads(text)
-    travel, switch = data["travel"], data["switch"]
-    detents = np.array(sorted(deg(angle) for angle in switch["detents_deg"]))
+    part = (xv15_profile() if profile is None else profile).nacelle
+    travel, switch = part.table("travel"), part.table("switch")
+    forward_stop = travel.number("forward_stop_deg", low=0.0, high=30.0)
+    aft_stop = travel.number("aft_stop_deg", low=60.0, high=95.0)
+    aft = travel.number("extended_aft_stop_deg", low=aft_stop, high=95.0) if extended_aft_travel else aft_stop
+    detents = np.array(sorted(deg(a) for a in switch.numbers("detents_deg", low=forward_stop, high=aft_stop)))
     detents.flags.writeable = False
     return NacelleTables(
-        frequency=float(data["filter"]["natural_frequency_rad_s"]),
-        forward_stop=deg(travel["forward_stop_deg"]),
-        aft_stop=deg(travel["extended_aft_stop_deg" if extended_aft_travel else "aft_stop_deg"]),
-        downstop=deg(travel["downstop_deg"]),
-        assigned_rate=deg(data["assigned"]["rate_deg_s"]),
-        switch_rate=deg(switch["rate_deg_s"]),
-        slow_zone=deg(switch["slow_zone_deg"]),
-        slow_rate_forward=deg(switch["slow_rate_forward_deg_s"]),
-        slow_rate_aft=deg(switch["slow_rate_aft_deg_s"]),
+        frequency=part.table("filter").number("natural_frequency_rad_s", low=0.1, high=50.0),
+        forward_stop=deg(forward_stop),
+        aft_stop=deg(aft),
+        downstop=deg(travel.number("downstop_deg", low=forward_stop, high=10.0)),
+        assigned_rate=deg(part.table("assigned").number("rate_deg_s", low=0.1, high=60.0)),
+        switch_rate=deg(switch.number("rate_deg_s", low=0.1, high=60.0)),
+        slow_zone=deg(switch.number("slow_zone_deg", low=0.0, high=30.0)),
+        slow_rate_forward=deg(switch.number("slow_rate_forward_deg_s", low=0.01, high=60.0)),
+        slow_rate_aft=deg(switch.number("slow_rate_aft_deg_s", low=0.01, high=60.0)),
         detents=detents,
     )
 

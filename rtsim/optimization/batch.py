@@ -84,7 +84,7 @@ class BatchFlyer:
         """
         seed = self.setup.options.seed if flight.seed is None else flight.seed
         setup = dataclasses.replace(self.setup.with_options(seed=seed), programme=flight.programme)
-        sums = new_sums()
+        sums = new_sums(self._parts.database.profile)
         flying = prepare(setup, measure=(add_metrics, sums), unlocked=True)
         duration = flight.programme.duration if flight.duration is None else flight.duration
         flying.run(max(1, math.ceil(duration * self.setup.options.rate_hz - 1e-6)))

@@ -9,13 +9,16 @@ from __future__ import annotations
 import dataclasses
 import itertools
 from collections.abc import Callable
-from functools import cache
+from functools import lru_cache
 
 import numpy as np
 
+from rtsim.aircraft.profile import xv15_profile
+from rtsim.aircraft.variables import required_position
 from rtsim.corridor import load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
+from rtsim.lpv.database import Database
 from rtsim.optimization.path import (
     TABLE_1_CAPS,
     AccelerationCaps,
@@ -37,8 +40,8 @@ TABLE_1: tuple[tuple[float, float], ...] = (
     (170.0, 0.0),
 )
 """Airspeed [kn] and nacelle angle [deg] of the points of the paper's Table 1."""
-FINAL_AIRSPEED_KT = 170.0
-"""Airspeed at which every conversion ends, in airplane mode [kn]."""
+_LEAST_FAST_KT = 60.0
+"""Slowest airspeed of the fast-side path beside helicopter mode, with Table 1's end [kn]."""
 NEAR_STALL_MARGIN_KT = 5.0
 """Distance of the near-stall path from the power-on stall line [kn]."""
 FAST_SIDE_MARGIN_KT = 8.0
@@ -52,24 +55,47 @@ RECONVERSION_CAPS = AccelerationCaps.uniform(2.0)
 _STEP_DEG = 5.0
 
 
-def table_1(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TABLE_1_CAPS) -> ConversionPath:
+def conversion_end_kt(aircraft: Database | None = None) -> float:
+    """Airspeed at which an aircraft's conversions end, in airplane mode [kn].
+
+    Args:
+        aircraft: Its database; None: the XV-15.
+
+    Raises:
+        InputError: Its profile does not say, or the value is out of range.
+    """
+    profile = xv15_profile() if aircraft is None else aircraft.profile
+    return profile.dimensions.number("conversion_end_kt", low=10.0, high=500.0)
+
+
+def _in_proportion(airspeed_kt: float, aircraft: Database | None) -> float:
+    """An airspeed of the XV-15's Table 1 in proportion to where another aircraft's conversions end [kn]."""
+    return airspeed_kt * conversion_end_kt(aircraft) / TABLE_1[-1][0]
+
+
+def table_1(
+    *, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TABLE_1_CAPS, aircraft: Database | None = None
+) -> ConversionPath:
     """The paper's typical conversion (Table 1), its nacelles moving at a constant rate and waiting in between.
 
     Args:
         nacelle_rate_deg_s: Nacelle rate [deg/s].
         caps: Acceleration caps.
+        aircraft: The database of another aircraft than the shipped XV-15.
     """
     return path_through(
         "typical",
         "Typical conversion (Table 1)",
-        TABLE_1,
+        [(round(_in_proportion(v, aircraft), 3), n) for v, n in TABLE_1],
         nacelle_rate_deg_s=nacelle_rate_deg_s,
         caps=caps,
         description="Table 1 of the paper: 3 kn/s to the 50 deg detent, 4 kn/s on it, 5 kn/s in airplane mode.",
     )
 
 
-def near_stall(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = NEAR_STALL_CAPS) -> ConversionPath:
+def near_stall(
+    *, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = NEAR_STALL_CAPS, aircraft: Database | None = None
+) -> ConversionPath:
     """The path pilots tend to fly: along the low-speed side of the corridor (paper, Figure 11).
 
     It follows the power-on stall line of TM 81244 (the corridor ``flight``), which is also where the model stalls.
@@ -77,13 +103,14 @@ def near_stall(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = NEAR
     Args:
         nacelle_rate_deg_s: Nacelle rate [deg/s].
         caps: Acceleration caps.
+        aircraft: The database of another aircraft than the shipped XV-15.
     """
-    low = load_corridor("flight").low
-    corners = [(0.0, 90.0), (12.0, 80.0)]
+    low = load_corridor("flight", None if aircraft is None else aircraft.profile).low
+    corners = [(0.0, 90.0), (_in_proportion(12.0, aircraft), 80.0)]
     for nacelle in (75.0, 70.5, 65.0, 60.0, 55.0, 50.0, 45.0, 40.0, 35.0, 30.0, 25.0, 20.0, 15.0, 10.0, 5.0, 0.0):
         airspeed = to_kt(float(low.at(deg(nacelle)))) + NEAR_STALL_MARGIN_KT
-        corners.append((round(max(airspeed, 22.0), 3), nacelle))
-    corners.append((FINAL_AIRSPEED_KT, 0.0))
+        corners.append((round(max(airspeed, _in_proportion(22.0, aircraft)), 3), nacelle))
+    corners.append((conversion_end_kt(aircraft), 0.0))
     return path_through(
         "near_stall",
         "Conversion along the stall limit",
@@ -98,28 +125,35 @@ def near_stall(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = NEAR
     )
 
 
-def centre_line_corners() -> list[tuple[float, float]]:
-    """The centre line of the design corridor from hover to airplane mode: (airspeed [kn], nacelle angle [deg])."""
-    corridor = load_corridor("design")
+def centre_line_corners(aircraft: Database | None = None) -> list[tuple[float, float]]:
+    """The centre line of the design corridor from hover to airplane mode: (airspeed [kn], nacelle angle [deg]).
+
+    Args:
+        aircraft: The database of another aircraft than the shipped XV-15.
+    """
+    corridor = load_corridor("design", None if aircraft is None else aircraft.profile)
     corners = [(0.0, 90.0)]
     for nacelle in np.arange(90.0, -_STEP_DEG / 2.0, -_STEP_DEG):
         airspeed = to_kt(float(corridor.centre_speed(deg(float(nacelle)))))
         corners.append((round(max(airspeed, corners[-1][0]), 3), float(nacelle)))
-    corners.append((FINAL_AIRSPEED_KT, 0.0))
+    corners.append((conversion_end_kt(aircraft), 0.0))
     return corners
 
 
-def centre_line(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TABLE_1_CAPS) -> ConversionPath:
+def centre_line(
+    *, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TABLE_1_CAPS, aircraft: Database | None = None
+) -> ConversionPath:
     """The safest path: the centre line of the corridor at a constant nacelle rate (paper, Figure 13).
 
     Args:
         nacelle_rate_deg_s: Nacelle rate [deg/s].
         caps: Acceleration caps.
+        aircraft: The database of another aircraft than the shipped XV-15.
     """
     return path_through(
         "centre_line",
         "Centre line of the corridor at constant nacelle rate",
-        centre_line_corners(),
+        centre_line_corners(aircraft),
         nacelle_rate_deg_s=nacelle_rate_deg_s,
         nacelle_motion="spread",
         caps=caps,
@@ -128,7 +162,11 @@ def centre_line(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TAB
 
 
 def centre_line_variable(
-    *, acceleration_kt_s: float = 4.0, largest_rate_deg_s: float = 12.0, airplane_kt_s: float = 5.0
+    *,
+    acceleration_kt_s: float = 4.0,
+    largest_rate_deg_s: float = 12.0,
+    airplane_kt_s: float = 5.0,
+    aircraft: Database | None = None,
 ) -> ConversionPath:
     """The centre line at a held acceleration, the nacelle rate following from it (paper, Figure 15).
 
@@ -136,8 +174,9 @@ def centre_line_variable(
         acceleration_kt_s: Acceleration in conversion [kn/s].
         largest_rate_deg_s: Largest nacelle rate [deg/s]; where it does not do, the acceleration gives way.
         airplane_kt_s: Acceleration in airplane mode [kn/s].
+        aircraft: The database of another aircraft than the shipped XV-15.
     """
-    corners = centre_line_corners()
+    corners = centre_line_corners(aircraft)
     points = [PathPoint(*corners[0])]
     for before, corner in itertools.pairwise(corners):
         change, tilt = corner[0] - before[0], before[1] - corner[1]
@@ -155,21 +194,24 @@ def centre_line_variable(
     )
 
 
-@cache
-def trim_flapping_map() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The trimmed cyclic flapping over the corridor (paper, Figure 6), from the shipped database.
+@lru_cache(maxsize=4)
+def trim_flapping_map(aircraft: Database | None = None) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The trimmed cyclic flapping over the corridor (paper, Figure 6), from the database.
+
+    Args:
+        aircraft: The database of another aircraft than the shipped XV-15.
 
     Returns:
         Airspeeds [kn], shape (v,); nacelle angles [deg], shape (n,); flapping magnitude [deg], shape (v, n), NaN where
         the level layer has no trim.
     """
-    from rtsim.aircraft.variables import STATE
-    from rtsim.lpv.aircraft import load_aircraft
+    from rtsim.lpv.files.storage import load_database
 
-    database = load_aircraft().database
-    layer = int(np.argmin(np.abs(database.layer_acceleration)))
+    database = load_database() if aircraft is None else aircraft
+    layer = database.level_layer
+    cosine, sine = (required_position(database.states, name, "the path") for name in ("flap_1c", "flap_1s"))
     x = database.x_ref[layer]
-    flapping = np.hypot(x[:, :, STATE.flap_1c], x[:, :, STATE.flap_1s])
+    flapping = np.hypot(x[:, :, cosine], x[:, :, sine])
     flapping = np.where(database.valid[layer], np.degrees(flapping), np.nan)
     result = (database.airspeed / kt(1.0), database.nacelle / deg(1.0), flapping)
     for array in result:
@@ -177,27 +219,30 @@ def trim_flapping_map() -> tuple[FloatArray, FloatArray, FloatArray]:
     return result
 
 
-def _fast_side_corners() -> list[tuple[float, float]]:
+def _fast_side_corners(aircraft: Database | None) -> list[tuple[float, float]]:
     """For each nacelle angle the airspeed of least trim flapping, never falling as the nacelles tilt."""
-    airspeeds, nacelles, flapping = trim_flapping_map()
-    corridor = load_corridor("design")
+    airspeeds, nacelles, flapping = trim_flapping_map(aircraft)
+    corridor = load_corridor("design", None if aircraft is None else aircraft.profile)
     corners = [(0.0, 90.0)]
     for nacelle in np.arange(90.0, -_STEP_DEG / 2.0, -_STEP_DEG):
         column = flapping[:, int(np.argmin(np.abs(nacelles - nacelle)))]
         valid = ~np.isnan(column)
         low, high = (to_kt(float(side.at(deg(float(nacelle))))) for side in (corridor.low, corridor.high))
         fast_edge = float(airspeeds[valid].max())
-        from_kt = max(low, float(airspeeds[valid].min()), 60.0) + FAST_SIDE_MARGIN_KT
+        least = _in_proportion(_LEAST_FAST_KT, aircraft)
+        from_kt = max(low, float(airspeeds[valid].min()), least) + FAST_SIDE_MARGIN_KT
         to_airspeed = min(high, fast_edge) - FAST_SIDE_MARGIN_KT
         fine = np.arange(from_kt, to_airspeed + 0.25, 0.5)
         values = np.interp(fine, airspeeds[valid], column[valid])
         best = float(fine[int(np.argmin(values))])
         corners.append((round(max(best, corners[-1][0]), 3), float(nacelle)))
-    corners.append((FINAL_AIRSPEED_KT, 0.0))
+    corners.append((conversion_end_kt(aircraft), 0.0))
     return corners
 
 
-def fast_side(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = FAST_SIDE_CAPS) -> ConversionPath:
+def fast_side(
+    *, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = FAST_SIDE_CAPS, aircraft: Database | None = None
+) -> ConversionPath:
     """The path of least trim flapping (paper, Figure 7): down the map's slope along the fast side of the corridor.
 
     From hover it crosses the low-speed ridge at nacelle 90, where the slope is steepest in airspeed; then, at each
@@ -206,46 +251,53 @@ def fast_side(*, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = FAST_
     Args:
         nacelle_rate_deg_s: Nacelle rate [deg/s].
         caps: Acceleration caps.
+        aircraft: The database of another aircraft than the shipped XV-15.
     """
     return path_through(
         "fast_side",
         "Least trim flapping, along the fast side",
-        _fast_side_corners(),
+        _fast_side_corners(aircraft),
         nacelle_rate_deg_s=nacelle_rate_deg_s,
         nacelle_motion="spread",
         caps=caps,
         description=(
-            "At each nacelle angle the airspeed of least trimmed cyclic flapping of the shipped database, "
+            "At each nacelle angle the airspeed of least trimmed cyclic flapping of the database, "
             f"{FAST_SIDE_MARGIN_KT:g} kn away from its edge; {caps.above_detent_kt_s:g} kn/s above the 50 deg detent."
         ),
     )
 
 
-GENERATORS: dict[str, Callable[[float], ConversionPath]] = {
-    "typical": lambda rate: table_1(nacelle_rate_deg_s=rate),
-    "near_stall": lambda rate: near_stall(nacelle_rate_deg_s=rate),
-    "centre_line": lambda rate: centre_line(nacelle_rate_deg_s=rate),
-    "centre_line_variable": lambda rate: centre_line_variable(largest_rate_deg_s=max(rate, 12.0)),
-    "fast_side": lambda rate: fast_side(nacelle_rate_deg_s=rate),
+GENERATORS: dict[str, Callable[[float, Database | None], ConversionPath]] = {
+    "typical": lambda rate, aircraft: table_1(nacelle_rate_deg_s=rate, aircraft=aircraft),
+    "near_stall": lambda rate, aircraft: near_stall(nacelle_rate_deg_s=rate, aircraft=aircraft),
+    "centre_line": lambda rate, aircraft: centre_line(nacelle_rate_deg_s=rate, aircraft=aircraft),
+    "centre_line_variable": lambda rate, aircraft: centre_line_variable(
+        largest_rate_deg_s=max(rate, 12.0), aircraft=aircraft
+    ),
+    "fast_side": lambda rate, aircraft: fast_side(nacelle_rate_deg_s=rate, aircraft=aircraft),
 }
-"""The paper's paths by name, each a function of the nacelle rate [deg/s] (12 or more for the variable-rate one)."""
+"""The paper's paths by name, each a function of the nacelle rate [deg/s] (12 or more for the variable-rate one) and of
+the aircraft's database."""
 PATH_NAMES: tuple[str, ...] = tuple(GENERATORS)
 
 
-def paper_path(name: str, *, nacelle_rate_deg_s: float = 3.0, reconversion: bool = False) -> ConversionPath:
+def paper_path(
+    name: str, *, nacelle_rate_deg_s: float = 3.0, reconversion: bool = False, aircraft: Database | None = None
+) -> ConversionPath:
     """One of the paper's paths by name.
 
     Args:
         name: One of :data:`PATH_NAMES`.
         nacelle_rate_deg_s: Nacelle rate [deg/s]; the variable-rate path takes its largest rate, 12 deg/s, instead.
         reconversion: Flown backwards, at 2 kn/s.
+        aircraft: The database of another aircraft than the shipped XV-15.
 
     Raises:
         InputError: There is no such path.
     """
     if name not in GENERATORS:
         raise InputError("is not a path", key="path", value=name, allowed=", ".join(PATH_NAMES))
-    path = GENERATORS[name](nacelle_rate_deg_s)
+    path = GENERATORS[name](nacelle_rate_deg_s, aircraft)
     if name != "centre_line_variable":
         path = dataclasses.replace(path, name=f"{name}_{_rate_text(nacelle_rate_deg_s)}")
     return path.reconversion(caps=RECONVERSION_CAPS) if reconversion else path
@@ -255,15 +307,16 @@ def _rate_text(rate: float) -> str:
     return f"{rate:g}deg".replace(".", "p")
 
 
-def corridor_distance_kt(path: ConversionPath, *, corridor: str = "design") -> float:
+def corridor_distance_kt(path: ConversionPath, *, corridor: str = "design", aircraft: Database | None = None) -> float:
     """Smallest distance of the planned path to the corridor's boundaries [kn], negative outside.
 
     Args:
         path: The path.
         corridor: Name of the corridor.
+        aircraft: The database of another aircraft than the shipped XV-15.
     """
     programme = path.programme()
-    boundaries = load_corridor(corridor)
+    boundaries = load_corridor(corridor, None if aircraft is None else aircraft.profile)
     time = np.linspace(0.0, programme.duration, 2001)
     airspeed = np.interp(time, programme.time, programme.airspeed)
     nacelle = np.interp(time, programme.time, programme.nacelle_angle)
@@ -280,6 +333,7 @@ __all__ = [
     "centre_line",
     "centre_line_corners",
     "centre_line_variable",
+    "conversion_end_kt",
     "corridor_distance_kt",
     "fast_side",
     "near_stall",

@@ -14,10 +14,11 @@ from rtsim.frame import FloatArray
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup
+from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import ConversionPath, path_through
-from rtsim.optimization.paths import FINAL_AIRSPEED_KT, PATH_NAMES, paper_path
+from rtsim.optimization.paths import PATH_NAMES, conversion_end_kt, paper_path
 from rtsim.optimization.spec import SearchSpec
 
 NACELLE_START_DEG = 90.0
@@ -59,7 +60,7 @@ class Evaluation:
 
 
 class ConversionProblem:
-    """N free points between hover and 170 kn in airplane mode.
+    """N free points between hover and airplane mode, up to where the aircraft's conversions end.
 
     The variables are the airspeeds and the nacelle angles of the points as shares of their ranges. They are sorted, so
     that every vector of the unit box is a conversion: airspeed never falls and the nacelles never tilt back.
@@ -71,8 +72,13 @@ class ConversionProblem:
         Args:
             spec: What is searched.
             workers: Threads that fly; None takes one for every core.
+
+        Raises:
+            InputError: The database cannot be used.
         """
         self.spec = spec
+        self.aircraft = load_database(spec.flight.database or None)
+        self.final_airspeed_kt = conversion_end_kt(self.aircraft)
         self.variables = 2 * spec.points
         air, noise = AirSpecification(), False
         if spec.robust.flights:
@@ -93,8 +99,13 @@ class ConversionProblem:
         return tuple(range(FIRST_ROBUST_SEED, FIRST_ROBUST_SEED + self.spec.robust.flights)) or (0,)
 
     @property
+    def has_nonlinear_model(self) -> bool:
+        """Whether a path can be checked on the nonlinear model."""
+        return self.aircraft.profile.is_xv15
+
+    @property
     def database_hash(self) -> str:
-        """Content hash of the LPV database in use."""
+        """Hash of the aircraft's database and profile."""
         return self._flyer.database_hash
 
     def path(self, variables: FloatArray) -> ConversionPath:
@@ -106,11 +117,11 @@ class ConversionProblem:
         spec = self.spec
         count = spec.points
         clipped = np.clip(variables, 0.0, 1.0)
-        airspeed = np.round(np.sort(clipped[:count]) * FINAL_AIRSPEED_KT, COORDINATE_DIGITS)
+        airspeed = np.round(np.sort(clipped[:count]) * self.final_airspeed_kt, COORDINATE_DIGITS)
         nacelle = np.round(-np.sort(-clipped[count:]) * NACELLE_START_DEG, COORDINATE_DIGITS)
         corners = [(0.0, NACELLE_START_DEG)]
         corners += [(float(v), float(n)) for v, n in zip(airspeed, nacelle, strict=True)]
-        corners.append((FINAL_AIRSPEED_KT, 0.0))
+        corners.append((self.final_airspeed_kt, 0.0))
         return path_through(
             spec.name,
             f"Conversion found by search: least {', '.join(spec.objectives)}",
@@ -128,10 +139,10 @@ class ConversionProblem:
         laid along it at equal distances.
 
         Args:
-            path: A conversion from hover to 170 kn.
+            path: A conversion from hover to where the aircraft's conversions end.
         """
         corners = np.array(
-            [[p.airspeed_kt / FINAL_AIRSPEED_KT, p.nacelle_deg / NACELLE_START_DEG] for p in path.points]
+            [[p.airspeed_kt / self.final_airspeed_kt, p.nacelle_deg / NACELLE_START_DEG] for p in path.points]
         )
         if len(corners) - 2 == self.spec.points:
             inner = corners[1:-1]
@@ -146,7 +157,7 @@ class ConversionProblem:
         spec = self.spec
         paths = {}
         for name in PATH_NAMES:
-            own = paper_path(name, nacelle_rate_deg_s=spec.nacelle_rate_deg_s)
+            own = paper_path(name, nacelle_rate_deg_s=spec.nacelle_rate_deg_s, aircraft=self.aircraft)
             if name == "centre_line_variable" and spec.nacelle_rate_deg_s < 12.0:
                 continue  # without its rate it is the centre line
             capped = own.with_rates(
@@ -225,7 +236,7 @@ class ConversionProblem:
             flight.airspeed_max_error_kt / tight.airspeed_error_kt - 1.0,
             flight.flapping_peak_deg / tight.flapping_deg - 1.0,
             flight.controls_on_stop_frames / self.setup.options.rate_hz,
-            max(abs(flight.airspeed_final_kt - FINAL_AIRSPEED_KT) - arrival, flight.nacelle_final_deg - 0.5),
+            max(abs(flight.airspeed_final_kt - self.final_airspeed_kt) - arrival, flight.nacelle_final_deg - 0.5),
             flight.duration_s / limits.duration_s - 1.0 if limits.duration_s is not None else 0.0,
             flight.mast_torque_max_inlb / limits.mast_torque_inlb - 1.0 if limits.mast_torque_inlb is not None else 0.0,
         ]

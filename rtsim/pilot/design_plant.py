@@ -11,11 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from rtsim.aircraft.variables import NACELLE_INPUTS, RIGID_BODY_STATES, of_role, position, required_position
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
-from rtsim.lpv.variables import NACELLE_INPUTS, RIGID_BODY_STATES, position, required_position
+from rtsim.lpv.reduction import refuse_unknown_motion, settled
+from rtsim.pilot.layout_kernels import DISPLAYS
 from rtsim.pilot.problem import FloatArray
 from rtsim.pilot.weights import PilotSettings
 
@@ -23,8 +24,6 @@ CONTROLS = ("stick", "lever")
 """The pilot's hands, as inputs of the database."""
 GUSTS = ("gust_u", "gust_w")
 """Gusts the pilot reckons with, as inputs of the database."""
-DISPLAYS = ("airspeed", "altitude", "climb_rate", "pitch", "pitch_rate")
-"""What the pilot sees; with integrators also ``airspeed_integral`` and ``altitude_integral``."""
 INTEGRALS = ("airspeed_integral", "altitude_integral")
 """Integrals of the first two displays' errors."""
 _LUMPED_TOLERANCE = 1e-2
@@ -38,8 +37,6 @@ class PlantLayout:
     """Positions of u, w, q, pitch, altitude."""
     actuators: tuple[tuple[int, ...], ...]
     """Positions of the actuator states of each hand."""
-    fast: tuple[int, ...]
-    """Positions of the states that are residualized."""
     controls: tuple[int, ...]
     """Positions of the hands among the inputs."""
     gusts: tuple[int, ...]
@@ -78,7 +75,7 @@ class DesignPlant:
 
 
 def plant_layout(database: Database, *, integrators: bool) -> PlantLayout:
-    """Sort the database's states into rigid body, actuators and fast states.
+    """Find the rigid body and the actuators of each hand among the database's states.
 
     Args:
         database: The linear models.
@@ -94,36 +91,23 @@ def plant_layout(database: Database, *, integrators: bool) -> PlantLayout:
     controls = tuple(required_position(database.inputs, name, "the pilot") for name in CONTROLS)
     gusts = tuple(required_position(database.inputs, name, "the pilot") for name in GUSTS)
     driven = np.any(np.abs(database.B[..., controls]) > 0.0, axis=(0, 1, 2))
-    others = [state for state in range(len(database.states)) if state not in rigid]
-    actuators = tuple(tuple(state for state in others if driven[state, hand]) for hand in range(len(controls)))
+    refuse_unknown_motion(database, "the pilot")
+    lags = of_role(database.states, "actuator")
+    actuators = tuple(tuple(state for state in lags if driven[state, hand]) for hand in range(len(controls)))
     shared = [state for state in actuators[0] if state in actuators[1]]
     if shared:
         raise InputError(
             "stick and lever drive the same state directly", key=f"B[{database.states[shared[0]].name}]",
             mend="give each hand its own actuator states",
         )  # fmt: skip
-    lumped = {state for rows in actuators for state in rows}
     return PlantLayout(
         rigid=rigid,
         actuators=actuators,
-        fast=tuple(state for state in others if state not in lumped),
         controls=controls,
         gusts=gusts,
         nacelle=tuple(position(database.inputs, name) for name in NACELLE_INPUTS),
         integrators=integrators,
     )
-
-
-def _residualized(
-    a: FloatArray, b: FloatArray, keep: npt.NDArray[np.intp], fast: npt.NDArray[np.intp]
-) -> tuple[FloatArray, FloatArray]:
-    """Let the fast states follow at once."""
-    if not fast.size:
-        return a[np.ix_(keep, keep)], b[keep]
-    follow = np.linalg.solve(a[np.ix_(fast, fast)], np.hstack([a[np.ix_(fast, keep)], b[fast]]))
-    slow = a[np.ix_(keep, fast)]
-    columns = keep.size
-    return a[np.ix_(keep, keep)] - slow @ follow[:, :columns], b[keep] - slow @ follow[:, columns:]
 
 
 def _lumped(
@@ -164,8 +148,14 @@ def design_plant(
     """
     kept = [*layout.rigid, *(row for rows in layout.actuators for row in rows)]
     inputs = [*layout.controls, *layout.gusts, *(column for column in layout.nacelle if column >= 0)]
-    full_b = database.B[where][:, inputs]
-    a, b = _residualized(database.A[where], full_b, np.array(kept), np.array(layout.fast, dtype=np.intp))
+    model = settled(
+        database,
+        keep=[database.states[place].name for place in kept],
+        inputs=[database.inputs[place].name for place in inputs],
+        purpose="the pilot",
+        where=where,
+    )
+    a, b = model.a, model.b
     body, lags, direct, rates = _lumped(a, b, layout, kept)
     names = layout.states
     n, rigid, hands = len(names), len(layout.rigid), len(CONTROLS)

@@ -11,16 +11,6 @@ from typing import NamedTuple
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.pilot.layout_kernels import (
     INTEGRALS,
-    R_A,
-    R_B,
-    R_C,
-    R_DELAY,
-    R_DISPLAYS,
-    R_F,
-    R_G,
-    R_HANDS,
-    R_L,
-    R_PLANT,
     FloatArray,
     PilotTables,
     pad4,
@@ -82,21 +72,21 @@ def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
         Views into the cell.
     """
     roles = tables.roles
-    hands = roles[R_HANDS]
-    displays = roles[R_DISPLAYS]
+    hands = roles.hands
+    displays = roles.displays
     seen = pad4(displays)
-    slow = roles[R_PLANT] + roles[R_DELAY]
-    rows = pad4(roles[R_PLANT])
+    slow = roles.plant + roles.delay
+    rows = pad4(roles.plant)
     wide = pad4(slow + hands)
     a = tables.a_columns.shape[0]
     c = tables.c_columns.shape[0]
     return Gains(
-        cell[roles[R_A] : roles[R_A] + a * rows].reshape((a, rows)),
-        cell[roles[R_B] : roles[R_B] + hands * rows].reshape((hands, rows)),
-        cell[roles[R_C] : roles[R_C] + c * seen].reshape((c, seen)),
-        cell[roles[R_F] : roles[R_F] + displays * wide].reshape((displays, wide)),
-        cell[roles[R_L] : roles[R_L] + slow * hands].reshape((slow, hands)),
-        cell[roles[R_G] : roles[R_G] + hands * hands].reshape((hands, hands)),
+        cell[roles.a : roles.a + a * rows].reshape((a, rows)),
+        cell[roles.b : roles.b + hands * rows].reshape((hands, rows)),
+        cell[roles.c : roles.c + c * seen].reshape((c, seen)),
+        cell[roles.f : roles.f + displays * wide].reshape((displays, wide)),
+        cell[roles.l : roles.l + slow * hands].reshape((slow, hands)),
+        cell[roles.g : roles.g + hands * hands].reshape((hands, hands)),
     )
 
 
@@ -113,34 +103,32 @@ def rates(
         at: Estimate, hands and delay filter.
         frozen: The integrals stand still.
         out: Receives the rates.
-        scratch: Room for the padded displays and the hands.
+        scratch: Room for the padded displays, the hands, and the states with a column.
     """
-    n = tables.roles[R_PLANT]
-    delay = tables.roles[R_DELAY]
-    hands = tables.roles[R_HANDS]
+    roles = tables.roles
+    n, delay, hands = roles.plant, roles.delay, roles.hands
     x, u, d = at.x, at.u, at.d
     dx, du, dd = out.x, out.u, out.d
-    rows = gains.A.shape[1]
-    seen = gains.C.shape[1]
-    wide = gains.F.shape[1]
+    rows, seen, wide = pad4(n), pad4(roles.displays), pad4(n + delay + hands)
     innovation = scratch[:seen]
     wanted = scratch[seen : seen + hands]
-    for k in range(wide):
-        dx[k] = 0.0
-    for k in range(rows):
-        dx[k] = held.plant[k]
-    for c in range(gains.A.shape[0]):
-        value = x[tables.a_columns[c]]
-        column = gains.A[c]
-        for k in range(rows):
-            dx[k] += column[k] * value
+    values = scratch[seen + hands : seen + hands + roles.a_columns + hands]
+    for c in range(roles.a_columns):
+        values[c] = x[tables.a_columns[c]]
     for hand in range(hands):
         value = tables.delay_d[hand] * x[n + delay + hand]
         for k in range(delay):
             value += tables.model_delay_c[hand, k] * x[n + k]
-        column = gains.B[hand]
-        for k in range(rows):
-            dx[k] += column[k] * value
+        values[roles.a_columns + hand] = value
+    for k in range(rows, wide):
+        dx[k] = 0.0
+    for k in range(rows):
+        total = held.plant[k]
+        for c in range(roles.a_columns):
+            total += gains.A[c, k] * values[c]
+        for hand in range(hands):
+            total += gains.B[hand, k] * values[roles.a_columns + hand]
+        dx[k] = total
     if frozen:
         for k in range(n - INTEGRALS, n):
             dx[k] = 0.0
@@ -157,7 +145,7 @@ def rates(
         dd[k] = true
     for hand in range(hands):
         wanted[hand] = held.command[hand]
-    for k in range(gains.L.shape[0]):
+    for k in range(n + delay):
         for hand in range(hands):
             wanted[hand] -= gains.L[k, hand] * x[k]
     for hand in range(hands):
@@ -168,18 +156,18 @@ def rates(
             true += gains.G[hand, other] * (wanted[other] - u[other])
         dx[n + delay + hand] = model
         du[hand] = true
+    for c in range(roles.c_columns):
+        values[c] = x[tables.c_columns[c]]
     for k in range(seen):
-        innovation[k] = held.displays[k]
-    for c in range(gains.C.shape[0]):
-        value = x[tables.c_columns[c]]
-        column = gains.C[c]
-        for k in range(seen):
-            innovation[k] -= column[k] * value
-    for display in range(gains.F.shape[0]):
-        value = innovation[display]
-        column = gains.F[display]
-        for k in range(wide):
-            dx[k] += column[k] * value
+        total = held.displays[k]
+        for c in range(roles.c_columns):
+            total -= gains.C[c, k] * values[c]
+        innovation[k] = total
+    for k in range(wide):
+        total = dx[k]
+        for display in range(roles.displays):
+            total += gains.F[display, k] * innovation[display]
+        dx[k] = total
 
 
 @inner_kernel
@@ -196,13 +184,13 @@ def limit_hands(tables: PilotTables, gains: Gains, held: Held, at: Motion, trim:
     Returns:
         Whether anything was taken off.
     """
-    hands = tables.roles[R_HANDS]
+    hands = tables.roles.hands
     limited = False
     for hand in range(hands):
         rate = 0.0
         for other in range(hands):
             wanted = held.command[other]
-            for k in range(gains.L.shape[0]):
+            for k in range(tables.roles.plant + tables.roles.delay):
                 wanted -= gains.L[k, other] * at.x[k]
             rate += gains.G[hand, other] * (wanted - at.u[other])
         allowed = min(tables.limits[2, hand], max(-tables.limits[2, hand], rate))
@@ -228,9 +216,9 @@ def motion_of(tables: PilotTables, work: FloatArray) -> Motion:
         Views into the array.
     """
     roles = tables.roles
-    hands = roles[R_HANDS]
-    delay = roles[R_DELAY]
-    wide = pad4(roles[R_PLANT] + delay + hands)
+    hands = roles.hands
+    delay = roles.delay
+    wide = pad4(roles.plant + delay + hands)
     return Motion(work[:wide], work[wide : wide + hands], work[wide + hands : wide + hands + delay])
 
 
@@ -245,7 +233,7 @@ def motion_size(tables: PilotTables) -> int:
         The number of float64 values.
     """
     roles = tables.roles
-    return int(pad4(roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]) + roles[R_HANDS] + roles[R_DELAY])
+    return int(pad4(roles.plant + roles.delay + roles.hands) + roles.hands + roles.delay)
 
 
 @inner_kernel
@@ -259,9 +247,9 @@ def held_of(tables: PilotTables, work: FloatArray) -> Held:
     Returns:
         Views into the array.
     """
-    hands = tables.roles[R_HANDS]
-    rows = pad4(tables.roles[R_PLANT])
-    command = rows + pad4(tables.roles[R_DISPLAYS])
+    hands = tables.roles.hands
+    rows = pad4(tables.roles.plant)
+    command = rows + pad4(tables.roles.displays)
     return Held(
         work[:rows],
         work[rows:command],
@@ -281,4 +269,4 @@ def held_size(tables: PilotTables) -> int:
     Returns:
         The number of float64 values.
     """
-    return int(pad4(tables.roles[R_PLANT]) + pad4(tables.roles[R_DISPLAYS]) + 3 * tables.roles[R_HANDS])
+    return int(pad4(tables.roles.plant) + pad4(tables.roles.displays) + 3 * tables.roles.hands)

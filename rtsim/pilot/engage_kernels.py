@@ -6,6 +6,7 @@ import numpy as np
 
 from rtsim.kernels.compiled import allocating_kernel
 from rtsim.pilot.layout_kernels import (
+    DISPLAY,
     INTEGRALS,
     LOOP_INTEGRATORS,
     N_KI_H,
@@ -15,16 +16,7 @@ from rtsim.pilot.layout_kernels import (
     N_Z_H,
     N_Z_V,
     OFFSETS,
-    R_DELAY,
-    R_DISPLAYS,
-    R_END,
-    R_HANDS,
-    R_L,
-    R_LOOP,
-    R_PLANT,
-    R_Q,
-    R_U,
-    R_W,
+    PLANT,
     REF_AIRSPEED,
     S_ESTIMATE,
     S_FILTERED,
@@ -67,36 +59,36 @@ def mocm_engage(
         present: Stick and lever that act now.
     """
     roles = tables.roles
-    n = roles[R_PLANT]
-    delay = roles[R_DELAY]
-    hands = roles[R_HANDS]
+    n = roles.plant
+    delay = roles.delay
+    hands = roles.hands
     estimate = n + delay + hands
     hands_at = S_ESTIMATE + estimate
     delay_at = hands_at + hands
     integrals_at = delay_at + delay
     last_at = integrals_at + INTEGRALS
     trim = np.zeros(4 * (1 + hands))
-    errors = np.zeros(pad4(roles[R_DISPLAYS]))
-    cell = np.zeros(roles[R_END])
+    errors = np.zeros(pad4(roles.displays))
+    cell = np.zeros(roles.end)
     for k in range(state.shape[0]):
         state[k] = 0.0
     own = np.zeros(OFFSETS)
     airspeed = observe(tables, x, reference, 0.0, 0.0, errors)
     state[S_FILTERED] = airspeed
     offset_at = last_at + n
-    state[offset_at] = errors[0]
-    state[offset_at + 2] = errors[1]
-    state[offset_at + 3] = errors[2]
+    state[offset_at] = errors[DISPLAY.airspeed]
+    state[offset_at + 2] = errors[DISPLAY.altitude]
+    state[offset_at + 3] = errors[DISPLAY.climb_rate]
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, trim)
     observe(tables, x, own, trim[0], 0.0, errors)
-    interpolate(tables, tables.cells, airspeed, nacelle_angle, roles[R_END], cell)
+    interpolate(tables, tables.cells, airspeed, nacelle_angle, roles.end, cell)
     plant_reference(tables, own, trim, 0.0, state[last_at : last_at + n])
-    state[S_ESTIMATE + 0] = x[roles[R_U]] - state[last_at + 0]
-    state[S_ESTIMATE + 1] = x[roles[R_W]] - state[last_at + 1]
-    state[S_ESTIMATE + 2] = x[roles[R_Q]]
-    state[S_ESTIMATE + 3] = errors[3]
-    state[S_ESTIMATE + 4] = errors[1]
+    state[S_ESTIMATE + PLANT.u] = x[roles.u] - state[last_at + PLANT.u]
+    state[S_ESTIMATE + PLANT.w] = x[roles.w] - state[last_at + PLANT.w]
+    state[S_ESTIMATE + PLANT.q] = x[roles.q]
+    state[S_ESTIMATE + PLANT.pitch] = errors[DISPLAY.pitch]
+    state[S_ESTIMATE + PLANT.altitude] = errors[DISPLAY.altitude]
     for hand in range(hands):
         held = present[hand] - trim[1 + hand]
         if tables.lags[hand] >= 0:
@@ -111,14 +103,14 @@ def mocm_engage(
 @allocating_kernel
 def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at: int, delay_at: int) -> None:
     """Put a delay filter at rest at the present hands: a x_d = -b u_p, by elimination."""
-    delay = tables.roles[R_DELAY]
+    delay = tables.roles.delay
     if delay == 0:
         return
     matrix = np.zeros((delay, delay + 1))
     for k in range(delay):
         for m in range(delay):
             matrix[k, m] = a[k, m]
-        for hand in range(tables.roles[R_HANDS]):
+        for hand in range(tables.roles.hands):
             matrix[k, delay] -= tables.delay_b[k, hand] * state[hands_at + hand]
     for k in range(delay):
         pivot = k
@@ -143,12 +135,12 @@ def _start_integrals(
     """Choose the integrals so that the wanted controls equal the present ones, within the integrals' limits."""
     roles = tables.roles
     numbers = tables.numbers
-    n = roles[R_PLANT]
-    delay = roles[R_DELAY]
-    hands = roles[R_HANDS]
+    n = roles.plant
+    delay = roles.delay
+    hands = roles.hands
     hands_at = S_ESTIMATE + n + delay + hands
     integrals_at = hands_at + hands + delay
-    inner = roles[R_LOOP] == LOOP_INTEGRATORS
+    inner = roles.loop == LOOP_INTEGRATORS
     if hands != INTEGRALS:
         return
     # two equations, effect of each integral on each hand's command = what is missing
@@ -157,10 +149,10 @@ def _start_integrals(
     for hand in range(hands):
         missing[hand] = state[hands_at + hand]
         for k in range(n + delay):
-            missing[hand] += cell[roles[R_L] + hands * k + hand] * state[S_ESTIMATE + k]
+            missing[hand] += cell[roles.l + hands * k + hand] * state[S_ESTIMATE + k]
         if inner:
-            m[hand, 0] = -cell[roles[R_L] + hands * (n - 2) + hand]
-            m[hand, 1] = -cell[roles[R_L] + hands * (n - 1) + hand]
+            m[hand, 0] = -cell[roles.l + hands * (n - 2) + hand]
+            m[hand, 1] = -cell[roles.l + hands * (n - 1) + hand]
         else:
             m[hand, 0] = outer_command(tables, cell, trim, airspeed, -numbers[N_KI_V], 0.0, hand)
             m[hand, 1] = outer_command(tables, cell, trim, airspeed, 0.0, -numbers[N_KI_H], hand)

@@ -8,7 +8,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import RIGID_BODY_STATES
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.packed import Size
+from rtsim.places import Places
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -31,28 +34,6 @@ LOOP_INTEGRATORS = 0
 LOOP_PI = 1
 """Airspeed and altitude held by outer PI loops that move the state reference (the paper's structure)."""
 
-# positions in PilotTables.roles
-R_LOOP = 0
-R_PLANT = 1
-R_DELAY = 2
-R_HANDS = 3
-R_DISPLAYS = 4
-R_U = 5
-R_W = 6
-R_Q = 7
-R_PITCH = 8
-R_ALTITUDE = 9
-R_A = 10
-R_B = 11
-R_N = 12
-R_C = 13
-R_F = 14
-R_L = 15
-R_G = 16
-R_V = 17
-R_END = 18
-R_COUNT = 19
-
 # positions in PilotTables.numbers
 N_GUST_LEAST = 0
 N_FILTER = 1
@@ -66,6 +47,13 @@ N_Z_V = 8
 N_Z_H = 9
 N_DT = 10
 N_COUNT = 11
+
+PLANT = Places(*RIGID_BODY_STATES)
+"""Places of the rigid body among the design plant's states."""
+DISPLAYS = ("airspeed", "altitude", "climb_rate", "pitch", "pitch_rate")
+"""What the pilot sees; with integrators also ``airspeed_integral`` and ``altitude_integral``."""
+DISPLAY = Places(*DISPLAYS)
+"""Places of the displays."""
 
 SAME_CONTROL = 1e-9
 """Applied and demanded controls closer than this are the same (rounding must not freeze the integrals)."""
@@ -93,6 +81,40 @@ S_LIMITED = 1
 """Position in the state: 1 while a hand was limited or overruled in the last frame."""
 S_ESTIMATE = 2
 """Position in the state of the estimate; hands, delay filter, integrals and last reference follow."""
+
+
+class PilotRoles(NamedTuple):
+    """Loop, sizes and positions: constants to the compiler."""
+
+    loop: Size
+    """``LOOP_INTEGRATORS`` or ``LOOP_PI``."""
+    plant: Size
+    """States of the design plant."""
+    delay: Size
+    """States of the delay filter."""
+    hands: Size
+    """Controls."""
+    displays: Size
+    """What the pilot sees."""
+    u: Size
+    """Positions of the rigid body in the aircraft state."""
+    w: Size
+    q: Size
+    pitch: Size
+    altitude: Size
+    a_columns: Size
+    """Columns of A and of C that are kept."""
+    c_columns: Size
+    a: Size
+    """Positions of the sections of a cell: dynamics, controls, nacelle, displays, filter, commands, lag, noise, end."""
+    b: Size
+    nacelle: Size
+    c: Size
+    f: Size
+    l: Size  # noqa: E741 - the symbol of the design
+    g: Size
+    v: Size
+    end: Size
 
 
 class PilotTables(NamedTuple):
@@ -128,8 +150,8 @@ class PilotTables(NamedTuple):
     """Rows: least, greatest, fastest [1/s]; columns: hands (3, nu)."""
     numbers: FloatArray
     """Scalars (``N_*``)."""
-    roles: IntArray
-    """Loop, sizes, positions of aircraft states and of the sections of a cell (``R_*``)."""
+    roles: PilotRoles
+    """Loop, sizes, positions of aircraft states and of the sections of a cell."""
 
 
 @inner_kernel
@@ -156,8 +178,8 @@ def pilot_state_size(tables: PilotTables) -> int:
         The number of float64 values.
     """
     roles = tables.roles
-    estimate = roles[R_PLANT] + roles[R_DELAY] + roles[R_HANDS]
-    return int(S_ESTIMATE + estimate + roles[R_HANDS] + roles[R_DELAY] + INTEGRALS + roles[R_PLANT] + OFFSETS)
+    estimate = roles.plant + roles.delay + roles.hands
+    return int(S_ESTIMATE + estimate + roles.hands + roles.delay + INTEGRALS + roles.plant + OFFSETS)
 
 
 @inner_kernel
@@ -170,7 +192,7 @@ def noise_width(tables: PilotTables) -> int:
     Returns:
         The number.
     """
-    return int(tables.roles[R_DISPLAYS] + tables.roles[R_HANDS])
+    return int(tables.roles.displays + tables.roles.hands)
 
 
 @inner_kernel
@@ -236,7 +258,7 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
         out: ``[:1 + nu]`` receives pitch and hands, ``[3 (1 + nu):4 (1 + nu)]`` their slopes with airspeed; the rest
             is scratch.
     """
-    count = 1 + tables.roles[R_HANDS]
+    count = 1 + tables.roles.hands
     interpolate(tables, tables.trim, reference[REF_AIRSPEED], nacelle_angle, 4 * count, out)
     limit = tables.numbers[N_ACCELERATION_LIMIT]
     a = min(limit, max(-limit, reference[REF_AIRSPEED_RATE]))
@@ -280,16 +302,16 @@ def observe(
         The airspeed [m/s].
     """
     roles = tables.roles
-    sine = math.sin(x[roles[R_PITCH]])
-    cosine = math.cos(x[roles[R_PITCH]])
-    u = x[roles[R_U]]
-    w = x[roles[R_W]]
+    sine = math.sin(x[roles.pitch])
+    cosine = math.cos(x[roles.pitch])
+    u = x[roles.u]
+    w = x[roles.w]
     airspeed = u * cosine + w * sine
-    out[0] = airspeed - reference[REF_AIRSPEED]
-    out[1] = x[roles[R_ALTITUDE]] - reference[REF_ALTITUDE]
-    out[2] = u * sine - w * cosine - reference[REF_CLIMB]
-    out[3] = x[roles[R_PITCH]] - pitch
-    out[4] = x[roles[R_Q]] - pitch_rate
+    out[DISPLAY.airspeed] = airspeed - reference[REF_AIRSPEED]
+    out[DISPLAY.altitude] = x[roles.altitude] - reference[REF_ALTITUDE]
+    out[DISPLAY.climb_rate] = u * sine - w * cosine - reference[REF_CLIMB]
+    out[DISPLAY.pitch] = x[roles.pitch] - pitch
+    out[DISPLAY.pitch_rate] = x[roles.q] - pitch_rate
     return float(airspeed)
 
 
@@ -309,14 +331,14 @@ def plant_reference(
     roles = tables.roles
     sine = math.sin(trim[0])
     cosine = math.cos(trim[0])
-    for k in range(roles[R_PLANT]):
+    for k in range(roles.plant):
         out[k] = 0.0
-    out[0] = reference[REF_AIRSPEED] * cosine + reference[REF_CLIMB] * sine
-    out[1] = reference[REF_AIRSPEED] * sine - reference[REF_CLIMB] * cosine
-    out[2] = pitch_rate
-    out[3] = trim[0]
-    out[4] = reference[REF_ALTITUDE]
-    for hand in range(roles[R_HANDS]):
+    out[PLANT.u] = reference[REF_AIRSPEED] * cosine + reference[REF_CLIMB] * sine
+    out[PLANT.w] = reference[REF_AIRSPEED] * sine - reference[REF_CLIMB] * cosine
+    out[PLANT.q] = pitch_rate
+    out[PLANT.pitch] = trim[0]
+    out[PLANT.altitude] = reference[REF_ALTITUDE]
+    for hand in range(roles.hands):
         if tables.lags[hand] >= 0:
             out[tables.lags[hand]] = trim[1 + hand]
 
@@ -342,9 +364,9 @@ def outer_command(
     Returns:
         The hand's command.
     """
-    hands = tables.roles[R_HANDS]
+    hands = tables.roles.hands
     slopes = 3 * (1 + hands)
-    place = tables.roles[R_L] + hand
+    place = tables.roles.l + hand
     sine = math.sin(trim[0])
     cosine = math.cos(trim[0])
     pitch_slope = trim[slopes]
@@ -368,9 +390,9 @@ def demand(tables: PilotTables, state: FloatArray, hand: int) -> float:
         hand: Number of the hand.
     """
     roles = tables.roles
-    delay = roles[R_DELAY]
-    hands_at = S_ESTIMATE + roles[R_PLANT] + delay + roles[R_HANDS]
-    delay_at = hands_at + roles[R_HANDS]
+    delay = roles.delay
+    hands_at = S_ESTIMATE + roles.plant + delay + roles.hands
+    delay_at = hands_at + roles.hands
     total = tables.delay_d[hand] * state[hands_at + hand]
     for k in range(delay):
         total += tables.output_delay_c[hand, k] * state[delay_at + k]

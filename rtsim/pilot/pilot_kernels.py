@@ -34,6 +34,7 @@ from rtsim.pilot.layout_kernels import (
     CAPTURE_CLIMB,
     CAPTURE_CLIMB_RATE,
     CAPTURE_FREQUENCY,
+    DISPLAY,
     INTEGRALS,
     LARGEST_AIRSPEED_ERROR,
     LARGEST_ALTITUDE_ERROR,
@@ -44,14 +45,7 @@ from rtsim.pilot.layout_kernels import (
     N_KP_H,
     N_KP_V,
     OFFSETS,
-    R_DELAY,
-    R_DISPLAYS,
-    R_END,
-    R_HANDS,
-    R_LOOP,
-    R_N,
-    R_PLANT,
-    R_V,
+    PLANT,
     REF_AIRSPEED,
     REF_AIRSPEED_RATE,
     S_ESTIMATE,
@@ -112,7 +106,7 @@ def mocm_output(
         noise: Standard normals of this frame (unused).
         out: Receives stick (-1..1) and lever (0..1).
     """
-    work = np.empty(4 * (1 + tables.roles[R_HANDS]) + OFFSETS)
+    work = np.empty(4 * (1 + tables.roles.hands) + OFFSETS)
     mocm_output_in(tables, state, nacelle_angle, reference, out, work)
 
 
@@ -135,10 +129,10 @@ def mocm_output_in(
         out: Receives stick (-1..1) and lever (0..1).
         work: Scratch of `pilot_work_size(tables)` numbers.
     """
-    own = work[4 * (1 + tables.roles[R_HANDS]) :]
+    own = work[4 * (1 + tables.roles.hands) :]
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, work)
-    for hand in range(tables.roles[R_HANDS]):
+    for hand in range(tables.roles.hands):
         value = work[1 + hand] + demand(tables, state, hand)
         out[hand] = min(tables.limits[1, hand], max(tables.limits[0, hand], value))
 
@@ -165,16 +159,16 @@ def _known_accelerations(
     nacelle_rate: float,
 ) -> None:
     """Accelerations of the plant that follow from the moving trim and the moving nacelles."""
-    n = tables.roles[R_PLANT]
+    n = tables.roles.plant
     rows = pad4(n)
     for k in range(n):
-        held.plant[k] = cell[tables.roles[R_N] + k] * nacelle_rate
+        held.plant[k] = cell[tables.roles.nacelle + k] * nacelle_rate
     for c in range(tables.a_columns.shape[0]):
-        if tables.a_columns[c] == 2:
+        if tables.a_columns[c] == PLANT.q:
             for k in range(n):
                 held.plant[k] += cell[rows * c + k] * pitch_rate
-    held.plant[0] += own[REF_AIRSPEED_RATE] * math.cos(trim[0])
-    held.plant[1] += own[REF_AIRSPEED_RATE] * math.sin(trim[0])
+    held.plant[PLANT.u] += own[REF_AIRSPEED_RATE] * math.cos(trim[0])
+    held.plant[PLANT.w] += own[REF_AIRSPEED_RATE] * math.sin(trim[0])
 
 
 @inner_kernel
@@ -183,14 +177,14 @@ def _outer_loops(
 ) -> None:
     """Hand the integrals to the displays, or the PI loops' commands to the hands."""
     roles = tables.roles
-    if roles[R_LOOP] == LOOP_INTEGRATORS:
+    if roles.loop == LOOP_INTEGRATORS:
         for k in range(INTEGRALS):
-            held.displays[roles[R_DISPLAYS] - INTEGRALS + k] = integrals[k]
+            held.displays[roles.displays - INTEGRALS + k] = integrals[k]
         return
     numbers = tables.numbers
-    dv = -numbers[N_KP_V] * held.displays[0] - numbers[N_KI_V] * integrals[0]
-    dh = -numbers[N_KP_H] * held.displays[1] - numbers[N_KI_H] * integrals[1]
-    for hand in range(roles[R_HANDS]):
+    dv = -numbers[N_KP_V] * held.displays[DISPLAY.airspeed] - numbers[N_KI_V] * integrals[0]
+    dh = -numbers[N_KP_H] * held.displays[DISPLAY.altitude] - numbers[N_KI_H] * integrals[1]
+    for hand in range(roles.hands):
         held.command[hand] = outer_command(tables, cell, trim, own[REF_AIRSPEED], dv, dh, hand)
 
 
@@ -234,8 +228,9 @@ def pilot_work_size(tables: PilotTables) -> int:
         The number of float64 values.
     """
     roles = tables.roles
-    hands = roles[R_HANDS]
-    fixed = 4 * (1 + hands) + OFFSETS + roles[R_PLANT] + roles[R_END] + pad4(roles[R_DISPLAYS]) + hands
+    hands = roles.hands
+    fixed = 4 * (1 + hands) + OFFSETS + roles.plant + roles.end + pad4(roles.displays) + hands
+    fixed += roles.a_columns + roles.c_columns + hands
     return fixed + held_size(tables) + 3 * motion_size(tables)
 
 
@@ -266,10 +261,10 @@ def mocm_advance_in(
         work[k] = 0.0
     nacelle_angle, nacelle_rate, dt = scalars
     roles = tables.roles
-    n = roles[R_PLANT]
-    hands = roles[R_HANDS]
-    displays = roles[R_DISPLAYS]
-    delay = roles[R_DELAY]
+    n = roles.plant
+    hands = roles.hands
+    displays = roles.displays
+    delay = roles.delay
     estimate = n + delay + hands
     hands_at = S_ESTIMATE + estimate
     integrals_at = hands_at + hands + delay
@@ -283,8 +278,8 @@ def mocm_advance_in(
     first = count + OFFSETS
     target = work[first : first + n]
     first += n
-    cell = work[first : first + roles[R_END]]
-    first += roles[R_END]
+    cell = work[first : first + roles.end]
+    first += roles.end
     constant = work[first : first + held_size(tables)]
     held = held_of(tables, constant)
     first += held_size(tables)
@@ -296,7 +291,7 @@ def mocm_advance_in(
     # the moving trim: what it moved since the last frame comes off the estimated deviation
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, trim)
-    pitch_rate = (trim[0] - state[last_at + 3]) / dt
+    pitch_rate = (trim[0] - state[last_at + PLANT.pitch]) / dt
     plant_reference(tables, own, trim, pitch_rate, target)
     for k in range(n):
         state[S_ESTIMATE + k] -= target[k] - state[last_at + k]
@@ -309,11 +304,11 @@ def mocm_advance_in(
         y.d[k] = state[hands_at + hands + k]
 
     noisy = noise.shape[0] > 0
-    interpolate(tables, tables.cells, state[S_FILTERED], nacelle_angle, roles[R_END] if noisy else roles[R_V], cell)
+    interpolate(tables, tables.cells, state[S_FILTERED], nacelle_angle, roles.end if noisy else roles.v, cell)
     gains = gains_of(tables, cell)
     airspeed = observe(tables, x, own, trim[0], pitch_rate, held.displays)
-    error_v = held.displays[0]
-    error_h = held.displays[1]
+    error_v = held.displays[DISPLAY.airspeed]
+    error_h = held.displays[DISPLAY.altitude]
     _outer_loops(tables, cell, held, trim, own, state[integrals_at : integrals_at + INTEGRALS])
     _known_accelerations(tables, cell, held, trim, own, pitch_rate, nacelle_rate)
     frozen = limit_hands(tables, gains, held, y, trim)
@@ -327,14 +322,14 @@ def mocm_advance_in(
     if noisy:
         root = 1.0 / math.sqrt(dt)
         for k in range(displays):
-            held.displays[k] += cell[roles[R_V] + k] * noise[k] * root
+            held.displays[k] += cell[roles.v + k] * noise[k] * root
         for hand in range(hands):
             for other in range(hands):
-                strength = cell[roles[R_V] + displays + other]
+                strength = cell[roles.v + displays + other]
                 held.motor[hand] += gains.G[hand, other] * strength * noise[displays + other] * root
 
     # the pilot is linear over a held frame, so RK4 is the Taylor series to fourth order
-    holds = frozen and roles[R_LOOP] == LOOP_INTEGRATORS
+    holds = frozen and roles.loop == LOOP_INTEGRATORS
     factor = dt
     for order in range(1, 5):
         rates(tables, gains, held, y, holds, rate, scratch)

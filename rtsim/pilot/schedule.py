@@ -13,7 +13,7 @@ from rtsim.lpv.database import JACOBIAN_BITS, Database, PilotArrays, round_manti
 from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
 from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem, build_problem
-from rtsim.pilot.weights import PilotSettings
+from rtsim.pilot.weights import PilotSettings, pilot_settings
 
 ARRAYS = ("A", "B", "C", "nacelle_effect", "l", "G2", "F", "V_y", "V_u", "g", "valid")
 """Arrays of a scheduled pilot, leading axes [airspeed, nacelle]."""
@@ -173,7 +173,7 @@ def design_schedule(
     Args:
         database: Trims and linear models.
         outer_loop: How airspeed and altitude are held.
-        settings: Weights and noises; None: the XV-15's.
+        settings: Weights and noises; None: the aircraft's.
         jobs: Processes to use; the result does not depend on it.
         progress: Called with the share of the work done since the last call; the shares add up to 1.
 
@@ -183,7 +183,7 @@ def design_schedule(
     Raises:
         MocmError: At some nacelle angle no pilot could be designed at all.
     """
-    chosen = settings if settings is not None else PilotSettings()
+    chosen = settings if settings is not None else pilot_settings(database.profile)
     layout = plant_layout(database, integrators=outer_loop == "integrators")
     arrays: dict[str, Any] = {}
     shape = (database.airspeed.size, database.nacelle.size)

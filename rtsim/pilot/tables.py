@@ -6,14 +6,16 @@ import functools
 
 import numpy as np
 
+from rtsim.aircraft.variables import RIGID_BODY_STATES
 from rtsim.choices import OuterLoop
 from rtsim.errors import InputError
-from rtsim.kernels.packed import packed
+from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.packed import Size, packed
 from rtsim.lpv.database import Database
 from rtsim.pilot import layout_kernels as kernels
 from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
-from rtsim.pilot.layout_kernels import PilotTables, noise_width, pilot_state_size
+from rtsim.pilot.layout_kernels import PilotRoles, PilotTables, noise_width, pilot_state_size
 from rtsim.pilot.problem import FloatArray
 from rtsim.pilot.schedule import ScheduledPilot
 
@@ -121,6 +123,10 @@ def _numbers(pilot: ScheduledPilot, database: Database, dt: float) -> FloatArray
     return numbers
 
 
+def _padded(count: int) -> int:
+    return interpreted(kernels.pad4)(count)
+
+
 def _columns(matrix: FloatArray, padded: int) -> FloatArray:
     """Flatten (..., rows, columns) column after column, each padded with zeros."""
     filled = np.zeros((*matrix.shape[:-2], matrix.shape[-1], padded))
@@ -130,35 +136,37 @@ def _columns(matrix: FloatArray, padded: int) -> FloatArray:
 
 def _pack_cells(
     pilot: ScheduledPilot, layout: PlantLayout
-) -> tuple[kernels.IntArray, FloatArray, kernels.IntArray, kernels.IntArray]:
+) -> tuple[PilotRoles, FloatArray, kernels.IntArray, kernels.IntArray]:
     """Flatten the gains of each cell and note where each section starts."""
     n, hands, displays = pilot.A.shape[-1], pilot.G2.shape[-1], pilot.C.shape[-2]
     estimate = pilot.F.shape[-2]
-    rows, seen, wide = kernels.pad4(n), kernels.pad4(displays), kernels.pad4(estimate)
+    rows, seen, wide = _padded(n), _padded(displays), _padded(estimate)
     a_columns = np.flatnonzero(np.any(pilot.A != 0.0, axis=(0, 1, 2)))
     c_columns = np.flatnonzero(np.any(pilot.C != 0.0, axis=(0, 1, 2)))
     noise = np.sqrt(np.concatenate([pilot.V_y, pilot.V_u], axis=-1))
     grid = pilot.A.shape[:2]
     sections = {
-        kernels.R_A: _columns(pilot.A[..., a_columns], rows),
-        kernels.R_B: _columns(pilot.B, rows),
-        kernels.R_N: _columns(pilot.nacelle_effect[..., :1], rows),
-        kernels.R_C: _columns(pilot.C[..., c_columns], seen),
-        kernels.R_F: _columns(pilot.F, wide),
-        kernels.R_L: _columns(pilot.l, hands),
-        kernels.R_G: pilot.G2.reshape(*grid, -1),
-        kernels.R_V: noise,
+        "a": _columns(pilot.A[..., a_columns], rows),
+        "b": _columns(pilot.B, rows),
+        "nacelle": _columns(pilot.nacelle_effect[..., :1], rows),
+        "c": _columns(pilot.C[..., c_columns], seen),
+        "f": _columns(pilot.F, wide),
+        "l": _columns(pilot.l, hands),
+        "g": pilot.G2.reshape(*grid, -1),
+        "v": noise,
     }
-    roles = np.zeros(kernels.R_COUNT, dtype=np.int64)
-    roles[kernels.R_LOOP] = kernels.LOOP_INTEGRATORS if layout.integrators else kernels.LOOP_PI
-    roles[kernels.R_PLANT], roles[kernels.R_HANDS], roles[kernels.R_DISPLAYS] = n, hands, displays
-    roles[kernels.R_DELAY] = estimate - n - hands
-    roles[[kernels.R_U, kernels.R_W, kernels.R_Q, kernels.R_PITCH, kernels.R_ALTITUDE]] = layout.rigid
-    position = 0
-    for role, section in sections.items():
-        roles[role] = position
-        position += section.shape[-1]
-    roles[kernels.R_END] = position
+    positions = np.cumsum([0, *(section.shape[-1] for section in sections.values())]).tolist()
+    roles = PilotRoles(
+        loop=Size(kernels.LOOP_INTEGRATORS if layout.integrators else kernels.LOOP_PI),
+        plant=Size(n),
+        delay=Size(estimate - n - hands),
+        hands=Size(hands),
+        displays=Size(displays),
+        a_columns=Size(a_columns.size),
+        c_columns=Size(c_columns.size),
+        **{name: Size(place) for name, place in zip(RIGID_BODY_STATES, layout.rigid, strict=True)},
+        **{name: Size(place) for name, place in zip((*sections, "end"), positions, strict=True)},
+    )
     cells = np.ascontiguousarray(np.concatenate(list(sections.values()), axis=-1))
     return roles, cells, a_columns.astype(np.int64), c_columns.astype(np.int64)
 

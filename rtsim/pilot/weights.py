@@ -1,13 +1,11 @@
-"""The XV-15 pilot's settings: one set of weights, thresholds and noises for the whole conversion corridor.
-
-Maxima, thresholds and attention are engineering values for a longitudinal instrument task (docs/pilot.md); noise ratios
-are the classic -20 dB and -25 dB, thresholds of pitch and pitch rate those of NASA CR-177943.
-"""
+"""A pilot's settings: one set of weights, thresholds and noises for the whole conversion corridor of an aircraft."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from rtsim.aircraft.profile import AircraftProfile, Part
 from rtsim.units import deg, ft
 
 
@@ -21,58 +19,107 @@ class DisplaySettings:
     """Half width of the indifference zone [the display's unit]."""
     attention: float
     """Share of attention, 0..1."""
-    noise_ratio: float = 0.01
-    """Observation noise ratio at full attention (-20 dB)."""
+    noise_ratio: float
+    """Observation noise ratio at full attention."""
 
 
 @dataclass(frozen=True, slots=True)
 class PilotSettings:
     """Everything that makes the scheduled pilot besides the aircraft. SI and radians."""
 
-    airspeed: DisplaySettings = DisplaySettings(maximum=2.5, threshold=0.25, attention=0.15)
+    airspeed: DisplaySettings
     """Airspeed error [m/s]."""
-    altitude: DisplaySettings = DisplaySettings(maximum=5.0, threshold=0.5, attention=0.20)
+    altitude: DisplaySettings
     """Altitude error [m]."""
-    climb_rate: DisplaySettings = DisplaySettings(maximum=1.0, threshold=0.15, attention=0.15)
+    climb_rate: DisplaySettings
     """Climb rate [m/s]."""
-    pitch: DisplaySettings = DisplaySettings(maximum=deg(5.0), threshold=deg(0.1), attention=0.50)
+    pitch: DisplaySettings
     """Pitch deviation [rad]; same instrument as the pitch rate."""
-    pitch_rate: DisplaySettings = DisplaySettings(maximum=deg(5.0), threshold=deg(0.18), attention=0.50)
+    pitch_rate: DisplaySettings
     """Pitch-rate deviation [rad/s]."""
-    integral_time: float = 10.0
+    integral_time: float
     """Maximum of an integral over the maximum of its error [s]."""
-    integral_noise_ratio: float = 1e-4
+    integral_noise_ratio: float
     """Observation noise ratio of the integrals, which the pilot keeps in mind and does not read."""
-    delay: float = 0.17
+    delay: float
     """Effective delay of both hands [s]."""
-    stick_lag: float = 0.1
+    stick_lag: float
     """Neuromotor lag of the stick hand [s]."""
-    lever_lag: float = 0.2
+    lever_lag: float
     """Neuromotor lag of the lever hand [s]."""
-    motor_noise_ratio: float = 10.0**-2.5
-    """Motor noise ratio (-25 dB)."""
-    gust_intensity: float = ft(5.06)
+    motor_noise_ratio: float
+    """Motor noise ratio."""
+    gust_intensity: float
     """Standard deviation of each gust component reckoned with [m/s]."""
-    gust_length: float = ft(1000.0)
+    gust_length: float
     """Turbulence length [m]."""
-    gust_least_airspeed: float = 15.433
-    """Airspeed below which the gust filters stay as they are (30 kn) [m/s]."""
-    schedule_time: float = 0.3
+    gust_least_airspeed: float
+    """Airspeed below which the gust filters stay as they are [m/s]."""
+    schedule_time: float
     """Time constant of the airspeed that schedules the gains [s]."""
-    stick_rate_limit: float = 10.0 / 4.8
-    """Fastest movement of the stick hand, 10 in/s [1/s]."""
-    lever_rate_limit: float = 0.6
+    stick_rate_limit: float
+    """Fastest movement of the stick hand [1/s]."""
+    lever_rate_limit: float
     """Fastest movement of the lever hand [1/s]."""
-    airspeed_proportional: float = 1.0
+    airspeed_proportional: float
     """Outer PI loop: airspeed command per airspeed error [-]."""
-    airspeed_integral: float = 0.1
+    airspeed_integral: float
     """Outer PI loop: airspeed command per integral of airspeed error [1/s]."""
-    altitude_proportional: float = 1.0
+    altitude_proportional: float
     """Outer PI loop: altitude command per altitude error [-]."""
-    altitude_integral: float = 0.2
+    altitude_integral: float
     """Outer PI loop: altitude command per integral of altitude error [1/s]."""
 
     @property
     def displays(self) -> tuple[DisplaySettings, ...]:
         """Airspeed, altitude, climb rate, pitch, pitch rate."""
         return (self.airspeed, self.altitude, self.climb_rate, self.pitch, self.pitch_rate)
+
+
+_DISPLAYS = (("airspeed", "m_s"), ("altitude", "m"), ("climb_rate", "m_s"), ("pitch", "deg"), ("pitch_rate", "deg_s"))
+_NUMBERS = (
+    ("integral_time", "s", 0.1, 1000.0),
+    ("integral_noise_ratio", "", 0.0, 1.0),
+    ("delay", "s", 0.01, 1.0),
+    ("stick_lag", "s", 0.01, 2.0),
+    ("lever_lag", "s", 0.01, 2.0),
+    ("motor_noise_ratio", "", 0.0, 1.0),
+    ("gust_intensity", "ft_s", 0.01, 100.0),
+    ("gust_length", "ft", 1.0, 100_000.0),
+    ("gust_least_airspeed", "m_s", 0.1, 200.0),
+    ("schedule_time", "s", 0.01, 100.0),
+    ("stick_rate_limit", "per_s", 0.01, 100.0),
+    ("lever_rate_limit", "per_s", 0.01, 100.0),
+    ("airspeed_proportional", "", 0.0, 100.0),
+    ("airspeed_integral", "per_s", 0.0, 100.0),
+    ("altitude_proportional", "", 0.0, 100.0),
+    ("altitude_integral", "per_s", 0.0, 100.0),
+)
+
+
+def pilot_settings(profile: AircraftProfile) -> PilotSettings:
+    """The settings of an aircraft's pilot.
+
+    Args:
+        profile: The aircraft.
+
+    Raises:
+        InputError: A value is missing or out of range.
+    """
+    part = profile.pilot
+    displays: dict[str, Any] = {name: _display(part.table(name), unit) for name, unit in _DISPLAYS}
+    numbers: dict[str, Any] = {}
+    for name, unit, low, high in _NUMBERS:
+        value = part.number(f"{name}_{unit}" if unit else name, low=low, high=high)
+        numbers[name] = ft(value) if unit.startswith("ft") else value
+    return PilotSettings(**displays, **numbers)
+
+
+def _display(part: Part, unit: str) -> DisplaySettings:
+    scale = deg(1.0) if unit.startswith("deg") else 1.0
+    return DisplaySettings(
+        maximum=part.number(f"maximum_{unit}", low=1e-6, high=1000.0) * scale,
+        threshold=part.number(f"threshold_{unit}", low=0.0, high=1000.0) * scale,
+        attention=part.number("attention", low=0.001, high=1.0),
+        noise_ratio=part.number("noise_ratio", low=0.0, high=1.0),
+    )

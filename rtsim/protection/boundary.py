@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
+from rtsim.aircraft.variables import required_position
 from rtsim.choices import CORRIDOR_NAMES
 from rtsim.corridor import Boundary, Corridor, load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
-from rtsim.lpv.variables import required_position
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import Limits, load_limits
 from rtsim.units import deg, to_deg, to_kt
@@ -57,9 +57,9 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
 
     Args:
         database: The trims.
-        limits: The torque limit; None: the XV-15's.
+        limits: The torque limit; None: the aircraft's.
     """
-    limits = load_limits() if limits is None else limits
+    limits = load_limits(database.profile) if limits is None else limits
     level = database.level_layer
     pitch = database.x_ref[level][..., required_position(database.states, "pitch", "the boundary")]
     torque = database.y_ref[level][..., required_position(database.outputs, "torque", "the boundary")]
@@ -72,7 +72,7 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
         middle = int(np.argmin(torque[good, j]))
         low[j] = _crossing(speeds[middle::-1], spare[middle::-1])
         high[j] = _crossing(speeds[middle:], (bound - torque[good, j])[middle:])
-    published = load_corridor("design")
+    published = load_corridor("design", database.profile)
     downstop = float(high[0])
     off_stop = database.nacelle > published.downstop_nacelle + 1e-9
     # On and just off the stop the trims are the same but for the flaps; the step stays at the downstop.
@@ -106,7 +106,7 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
 
     Args:
         name: ``design``, ``flight`` or ``model``.
-        database: What ``model`` is computed from; None: the shipped XV-15.
+        database: The aircraft; None: the shipped XV-15.
 
     Raises:
         InputError: There is no such boundary.
@@ -114,7 +114,7 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
     if name not in CORRIDOR_NAMES:
         raise InputError("no such boundary", key="corridor", value=name, allowed=", ".join(CORRIDOR_NAMES))
     if name != "model":
-        return load_corridor(name)
+        return load_corridor(name, None if database is None else database.profile)
     if database is None:
         from rtsim.lpv.files.storage import load_database
 
@@ -160,7 +160,7 @@ def trim_range(database: Database) -> tuple[FloatArray, FloatArray]:
 
     valid = database.valid[database.level_layer]
     grid = conversion_grid()
-    same = grid.wanted.shape == valid.shape
+    same = np.array_equal(grid.airspeed, database.airspeed) and np.array_equal(grid.nacelle, database.nacelle)
     tried = grid.wanted if same else np.ones_like(valid)
     slowest, fastest = np.full(valid.shape[1], -NO_LIMIT), np.full(valid.shape[1], NO_LIMIT)
     for j in range(valid.shape[1]):

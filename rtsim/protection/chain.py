@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from rtsim.aircraft.profile import AircraftProfile
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.errors import InputError
 from rtsim.protection.guard import Failure, GuardedAnswer, guarded_call
@@ -96,6 +97,7 @@ class LawChain:
         live: bool = False,
         on_event: Callable[[LawEvent], None] | None = None,
         remember: bool = False,
+        profile: AircraftProfile | None = None,
     ) -> None:
         """Make a fresh instance of every law.
 
@@ -106,11 +108,12 @@ class LawChain:
                 never skips, so that its commands do not depend on the machine.
             on_event: Told about every event.
             remember: Keep all calls, for ``unrepeatable``.
+            profile: The aircraft; None: the XV-15.
 
         Raises:
             InputError: A law cannot be made.
         """
-        self.every = frames_per_decision(dt)
+        self.every = frames_per_decision(profile, dt=dt)
         self.period = self.every * dt
         self.events: list[LawEvent] = []
         """What happened besides limiting."""

@@ -54,7 +54,7 @@ class BuiltInLaw:
             law: ``off``, ``monitor``, ``governor`` or ``full``.
             boundary: The corridor it keeps to.
             database: The aircraft it knows; None: the shipped XV-15.
-            settings: Its numbers; None: those of ``data/protection.toml``.
+            settings: Its numbers; None: the aircraft's.
 
         Raises:
             InputError: There is no such law.
@@ -149,7 +149,7 @@ class BuiltInLaw:
 
     def _margin(self, reason: int, sensors: Sensors) -> float:
         """Margin to the limit that asked for an intervention; the least predicted one for the corridor."""
-        limits = load_limits()
+        limits = load_limits(self._database.profile)
         if reason == data.REASON_FLAP:
             return float(limits.flapping - abs(sensors.flapping))
         if reason == data.REASON_PITCH:

@@ -1,128 +1,200 @@
-"""The numbers of the limits that are watched, and of the laws, from ``data/protection.toml``."""
+"""The numbers of the limits that are watched, and of the laws, from an aircraft's profile."""
 
 from __future__ import annotations
 
 import math
-import tomllib
-from functools import cache
-from importlib import resources
+from dataclasses import dataclass
+from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any
 
+import numpy as np
+
+from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
+from rtsim.errors import InputError
+from rtsim.frame import FloatArray
 from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
-from rtsim.protection.monitor_kernels import LIMIT_WORDS
+from rtsim.protection.monitor_kernels import LIMIT_NUMBERS, LIMIT_WORDS
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt
 
 LIMIT_KINDS = tuple(name for name in LIMIT_WORDS if name != "time_to_limit")
 """Limits by name; the number of a limit is its place here, and a recorded reason is that number plus one."""
-_SCALES = {"_deg_s": DEGREE, "_deg": DEGREE, "_kt": KNOT, "_inlb": INCH_POUND, "_m_s": 1.0, "_m": 1.0, "_s": 1.0}
+_SI = {"_deg_s": DEGREE, "_deg": DEGREE}
+"""SI value of one unit of a limit, by how its key ends; 1 for others."""
 
 
 class Limits(SimpleNamespace):
-    """Limits besides the corridor: every number under ``[limits]`` by its key without the unit, SI and radians."""
+    """Limits besides the corridor, those of ``LIMIT`` by name among them. SI and radians."""
 
     torque: TorqueTables
     """Mast torque."""
     sink: SinkTables
     """Sink rate."""
+    plant_guard: float
+    """Distance a law's low side keeps from where the plant's unstalled trims end [m/s]."""
 
 
-@cache
-def protection_data() -> dict[str, Any]:
-    """Read ``data/protection.toml``."""
-    text = resources.files("rtsim.aircraft.xv15").joinpath("data", "protection.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
+@lru_cache(maxsize=8)
+def load_limits(profile: AircraftProfile | None = None) -> Limits:
+    """Give an aircraft's limits.
 
+    Args:
+        profile: The aircraft; None: the XV-15.
 
-@cache
-def load_limits() -> Limits:
-    """Give the XV-15's limits."""
-    numbers = dict(_si(key, value) for key, value in protection_data()["limits"].items() if not isinstance(value, str))
+    Raises:
+        InputError: A value is missing or out of range.
+    """
+    data = _part(profile).table("limits")
     return Limits(
         torque=TorqueTables(
-            cruise=numbers["mast_torque"],
-            takeoff=numbers["mast_torque_takeoff"],
-            takeoff_nacelle=numbers["takeoff_nacelle_above"],
-            takeoff_airspeed=numbers["takeoff_airspeed_below"],
+            cruise=data.number("mast_torque_inlb", low=1.0, high=1e9) * INCH_POUND,
+            takeoff=data.number("mast_torque_takeoff_inlb", low=1.0, high=1e9) * INCH_POUND,
+            takeoff_nacelle=deg(data.number("takeoff_nacelle_above_deg", low=0.0, high=95.0)),
+            takeoff_airspeed=kt(data.number("takeoff_airspeed_below_kt", low=0.0, high=300.0)),
         ),
         sink=SinkTables(
-            floor=numbers["sink_rate"],
-            slope=math.sin(numbers["sink_angle"]),
-            height=numbers["sink_height"],
-            time=numbers["sink_time"],
+            floor=data.number("sink_rate_m_s", low=0.1, high=100.0),
+            slope=math.sin(deg(data.number("sink_angle_deg", low=0.0, high=60.0))),
+            height=data.number("sink_height_m", low=0.0, high=1e4),
+            time=data.number("sink_time_s", low=0.1, high=1e4),
         ),
-        **numbers,
+        plant_guard=kt(data.number("plant_guard_kt", low=0.0, high=100.0)),
+        **{
+            name: data.number(key, low=low, high=high) * next((_SI[end] for end in _SI if key.endswith(end)), 1.0)
+            for name, (key, low, high) in LIMIT_NUMBERS.items()
+        },
     )
 
 
-def _si(key: str, value: float) -> tuple[str, float]:
-    """A number by its name without the unit, SI and radians."""
-    for unit, scale in _SCALES.items():
-        if key.endswith(unit):
-            return key.removesuffix(unit), value * scale
-    return key, value
+UNIT_SCALE = {"kn": KNOT, "deg": DEGREE, "deg/s": DEGREE, "%": 0.01, "": 1.0, "m/s": 1.0, "s": 1.0}
+"""SI value of one unit of the levels' data."""
+WATCHED = tuple(LIMIT_WORDS)
+"""What has a margin and a level, in the order of the arrays."""
 
 
-def load_weights() -> RegulatorWeights:
-    """Give the weights of the recovery's regulator."""
-    data = protection_data()["regulator"]
+@dataclass(frozen=True, slots=True, eq=False)
+class LimitLevels:
+    """When each limit cautions, warns and counts as exceeded; rows in the order of ``WATCHED``. SI."""
+
+    units: tuple[str, ...]
+    """Unit in which people are told of the margin."""
+    scale: FloatArray
+    """SI value of that unit."""
+    threshold: FloatArray
+    """Margins below which caution, warning and exceedance begin, shape (limits, 3)."""
+    hysteresis: FloatArray
+    """How far above its threshold a margin must rise before the level ends."""
+    rise: float
+    """How long the margin must be below [s]."""
+    fall: float
+    """How long it must be above [s]."""
+
+
+@lru_cache(maxsize=8)
+def load_levels(profile: AircraftProfile | None = None) -> LimitLevels:
+    """Give the levels of an aircraft's limits.
+
+    Args:
+        profile: The aircraft; None: the XV-15.
+
+    Raises:
+        InputError: A value is missing or out of range.
+    """
+    data = _part(profile).table("levels")
+    parts = [data.table(name) for name in WATCHED]
+    units = tuple(part.text("unit") for part in parts)
+    for part, unit in zip(parts, units, strict=True):
+        if unit not in UNIT_SCALE:
+            raise InputError(
+                "is not a unit", file=part.file, key=f"{part.name}.unit", value=unit, allowed=", ".join(UNIT_SCALE)
+            )
+    scale = [UNIT_SCALE[unit] for unit in units]
+    rows = [part.numbers("threshold", low=-1e6, high=1e6, count=3) for part in parts]
+    return LimitLevels(
+        units=units,
+        scale=np.array(scale),
+        threshold=np.array([[s * value for value in row] for row, s in zip(rows, scale, strict=True)]),
+        hysteresis=np.array([s * p.number("hysteresis", low=0.0, high=1e6) for p, s in zip(parts, scale, strict=True)]),
+        rise=data.number("rise_s", low=0.0, high=60.0),
+        fall=data.number("fall_s", low=0.0, high=60.0),
+    )
+
+
+def load_weights(profile: AircraftProfile | None = None) -> RegulatorWeights:
+    """Give the weights of the recovery's regulator.
+
+    Args:
+        profile: The aircraft; None: the XV-15.
+
+    Raises:
+        InputError: A value is missing or out of range.
+    """
+    data = _part(profile).table("regulator")
     return RegulatorWeights(
-        airspeed=data["airspeed_m_s"],
-        climb_rate=data["climb_rate_m_s"],
-        pitch=deg(data["pitch_deg"]),
-        pitch_rate=deg(data["pitch_rate_deg_s"]),
-        stick=data["stick"],
-        lever=data["lever"],
+        airspeed=data.number("airspeed_m_s", low=0.01, high=100.0),
+        climb_rate=data.number("climb_rate_m_s", low=0.01, high=100.0),
+        pitch=deg(data.number("pitch_deg", low=0.01, high=90.0)),
+        pitch_rate=deg(data.number("pitch_rate_deg_s", low=0.01, high=200.0)),
+        stick=data.number("stick", low=0.001, high=10.0),
+        lever=data.number("lever", low=0.001, high=10.0),
     )
 
 
-def load_settings(*, dt: float) -> LawSettings:
+def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSettings:
     """Give the numbers of the built-in laws.
 
     Args:
+        profile: The aircraft; None: the XV-15.
         dt: Length of a frame [s]; the time between decisions is a whole number of frames.
+
+    Raises:
+        InputError: A value is missing or out of range.
     """
-    data = protection_data()
-    law, governor, full = data["law"], data["governor"], data["full"]
+    part = _part(profile)
+    law, governor, full = part.table("law"), part.table("governor"), part.table("full")
     return LawSettings(
-        period=frames_per_decision(dt) * dt,
-        horizon=law["horizon_s"],
-        step=law["prediction_step_s"],
-        warning_horizon=law["warning_horizon_s"],
-        warning_step=law["warning_step_s"],
-        bias_filter=law["bias_filter_s"],
-        bias_decay=law["bias_decay_s"],
-        bias_limit=law["bias_limit_m_s2"],
-        reverse_margin=kt(governor["reverse_margin_kt"]),
-        pass_margin=kt(governor["pass_margin_kt"]),
-        apply=governor["apply_s"],
-        reverse_rate=deg(governor["reverse_rate_deg_s"]),
-        flat_high_nacelle=deg(governor["flat_high_nacelle_deg"]),
-        finish_nacelle=deg(governor["finish_nacelle_deg"]),
-        blend_begin=kt(full["blend_begin_kt"]),
-        blend_full=kt(full["blend_full_kt"]),
-        blend_rise=full["blend_rise_per_s"],
-        blend_fall=full["blend_fall_per_s"],
-        recovery_margin=kt(full["recovery_margin_kt"]),
-        recovery_step=kt(full["recovery_step_kt"]),
-        height_floor=full["height_floor_m"],
-        height_full=full["height_full_m"],
-        sink_slope=math.sin(deg(data["limits"]["sink_angle_deg"])),
-        sink_floor=full["sink_rate_floor_m_s"],
-        flapping=deg(full["flapping_deg"]),
-        torque_share=full["torque_share"],
-        torque_lead=full["torque_lead_s"],
-        collective_lag=full["collective_lag_s"],
-        pitch=deg(full["pitch_deg"]),
-        pitch_frequency=full["pitch_frequency_rad_s"],
+        period=frames_per_decision(profile, dt=dt) * dt,
+        horizon=law.number("horizon_s", low=0.1, high=60.0),
+        step=law.number("prediction_step_s", low=0.01, high=2.0),
+        warning_horizon=law.number("warning_horizon_s", low=0.1, high=60.0),
+        warning_step=law.number("warning_step_s", low=0.01, high=2.0),
+        bias_filter=law.number("bias_filter_s", low=0.01, high=60.0),
+        bias_decay=law.number("bias_decay_s", low=0.01, high=60.0),
+        bias_limit=law.number("bias_limit_m_s2", low=0.0, high=20.0),
+        reverse_margin=kt(governor.number("reverse_margin_kt", low=-50.0, high=100.0)),
+        pass_margin=kt(governor.number("pass_margin_kt", low=-50.0, high=100.0)),
+        apply=governor.number("apply_s", low=0.0, high=10.0),
+        reverse_rate=deg(governor.number("reverse_rate_deg_s", low=0.1, high=60.0)),
+        flat_high_nacelle=deg(governor.number("flat_high_nacelle_deg", low=0.0, high=95.0)),
+        finish_nacelle=deg(governor.number("finish_nacelle_deg", low=0.0, high=95.0)),
+        blend_begin=kt(full.number("blend_begin_kt", low=-50.0, high=100.0)),
+        blend_full=kt(full.number("blend_full_kt", low=-50.0, high=100.0)),
+        blend_rise=full.number("blend_rise_per_s", low=0.01, high=1000.0),
+        blend_fall=full.number("blend_fall_per_s", low=0.01, high=1000.0),
+        recovery_margin=kt(full.number("recovery_margin_kt", low=0.0, high=200.0)),
+        recovery_step=kt(full.number("recovery_step_kt", low=0.0, high=200.0)),
+        height_floor=full.number("height_floor_m", low=0.0, high=1e4),
+        height_full=full.number("height_full_m", low=0.0, high=1e4),
+        sink_slope=load_limits(profile).sink.slope,
+        sink_floor=full.number("sink_rate_floor_m_s", low=0.0, high=100.0),
+        flapping=deg(full.number("flapping_deg", low=0.1, high=60.0)),
+        torque_share=full.number("torque_share", low=0.1, high=1.0),
+        torque_lead=full.number("torque_lead_s", low=0.0, high=10.0),
+        collective_lag=full.number("collective_lag_s", low=0.001, high=10.0),
+        pitch=deg(full.number("pitch_deg", low=1.0, high=80.0)),
+        pitch_frequency=full.number("pitch_frequency_rad_s", low=0.01, high=20.0),
     )
 
 
-def frames_per_decision(dt: float) -> int:
+def frames_per_decision(profile: AircraftProfile | None = None, *, dt: float) -> int:
     """Frames from one decision of a law to the next.
 
     Args:
+        profile: The aircraft; None: the XV-15.
         dt: Length of a frame [s].
     """
-    return max(1, round(1.0 / (float(protection_data()["law"]["rate_hz"]) * dt)))
+    return max(1, round(1.0 / (_part(profile).table("law").number("rate_hz", low=1.0, high=1000.0) * dt)))
+
+
+def _part(profile: AircraftProfile | None) -> Part:
+    return (xv15_profile() if profile is None else profile).protection

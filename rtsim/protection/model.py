@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.aircraft.variables import required_position
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
-from rtsim.lpv.variables import required_position
+from rtsim.lpv.reduction import settle, settled
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.protection import prediction_kernels as kernels
 from rtsim.protection.prediction_kernels import ModelTables
-from rtsim.units import GRAVITY, deg
+from rtsim.units import GRAVITY
 
 _RIGID = ("u", "w", "q", "pitch")
 _CONTROLS = ("stick", "lever")
@@ -37,13 +38,8 @@ class RegulatorWeights:
     """Lever [-]."""
 
 
-DEFAULT_WEIGHTS = RegulatorWeights(
-    airspeed=3.0, climb_rate=2.0, pitch=deg(8.0), pitch_rate=deg(10.0), stick=0.35, lever=0.25
-)
-
-
 @functools.lru_cache(maxsize=4)
-def reduce_model(database: Database, weights: RegulatorWeights = DEFAULT_WEIGHTS) -> ModelTables:
+def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
     """Reduce the level layer of a database to what the laws need.
 
     Rotor and actuator states settle within 0.2 s and are replaced by their settled values.
@@ -56,20 +52,14 @@ def reduce_model(database: Database, weights: RegulatorWeights = DEFAULT_WEIGHTS
         The kernels' tables.
     """
     level = database.level_layer
-    slow = [required_position(database.states, name, "protection") for name in _RIGID]
-    altitude = required_position(database.states, "altitude", "protection")
-    fast = [k for k in range(len(database.states)) if k not in slow and k != altitude]
-    inputs = [required_position(database.inputs, name, "protection") for name in (*_CONTROLS, "nacelle_rate")]
-    A, B, C, D = (getattr(database, name)[level] for name in "ABCD")
-    # The settled fast states are F_z (z - z_ref) + F_u (u - u_ref).
-    settle = -np.linalg.inv(A[..., fast, :][..., fast])
-    of_state = settle @ A[..., fast, :][..., slow]
-    of_input = settle @ B[..., fast, :][..., inputs]
-    of_nacelle = settle @ database.df_dnacelle[level][..., fast, None]
-    coupling = A[..., slow, :][..., fast]
-    a = A[..., slow, :][..., slow] + coupling @ of_state
-    b = B[..., slow, :][..., inputs] + coupling @ of_input
-    n = database.df_dnacelle[level][..., slow] + (coupling @ of_nacelle)[..., 0]
+    model = settled(
+        database, keep=_RIGID, inputs=(*_CONTROLS, "nacelle_rate"), purpose="the protection", by_inverse=True
+    )
+    slow, fast, inputs = list(model.kept), list(model.fast), list(model.inputs)
+    a, b, of_state, of_input = model.a, model.b, model.of_state, model.of_input
+    C, D = database.C[level], database.D[level]
+    of_nacelle = settle(model.inner, database.df_dnacelle[level][..., fast, None], by_inverse=True)
+    n = database.df_dnacelle[level][..., slow] + (model.coupling @ of_nacelle)[..., 0]
 
     z = database.x_ref[level][..., slow]
     cells = np.zeros((*z.shape[:2], kernels.CELL_SIZE))
@@ -107,7 +97,7 @@ def reduce_model(database: Database, weights: RegulatorWeights = DEFAULT_WEIGHTS
         cells[..., place + 4 : place + 7] = with_input
     gain = regulator_gains(a, b[..., :2], z, weights)
     cells[..., kernels.C_GAIN : kernels.C_GAIN + 8] = gain.reshape(*z.shape[:2], 8)
-    nacelle = load_nacelle_tables()
+    nacelle = load_nacelle_tables(database.profile)
     cells.setflags(write=False)
     return ModelTables(
         airspeed=database.airspeed,

@@ -16,17 +16,13 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
 from rtsim.protection.boundary import load_boundary, model_corridor
-from rtsim.protection.limits import load_limits, protection_data
-from rtsim.protection.monitor_kernels import FAR, KIND, LIMIT, LIMIT_WORDS, MonitorTables
+from rtsim.protection.limits import WATCHED, LimitLevels, load_levels, load_limits
+from rtsim.protection.monitor_kernels import FAR, KIND, LIMIT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
 from rtsim.units import DEGREE, KNOT
 
-WATCHED = tuple(LIMIT_WORDS)
-"""What has a margin and a level, in the order of the arrays."""
 SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
 """Quantities of the frame that sensors show under another name."""
-UNIT_SCALE = {"kn": KNOT, "deg": DEGREE, "deg/s": DEGREE, "%": 0.01, "": 1.0, "m/s": 1.0, "s": 1.0}
-"""SI value of one unit of the levels' data."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,22 +70,20 @@ class MarginHistory:
         return column
 
 
-class LimitLevels:
+class MarginWatch:
     """Margins and levels of rows that follow one another, and what they came to: the one way to watch a flight."""
 
-    def __init__(self, tables: MonitorTables, dt: float) -> None:
+    def __init__(self, tables: MonitorTables, limits: LimitLevels, dt: float) -> None:
         """Begin with all levels clear; compiles, or loads, what looks at rows.
 
         Args:
-            tables: Limits and levels.
+            tables: Limits and levels for the kernels.
+            limits: The levels for people.
             dt: Length of a frame [s].
         """
-        data = protection_data()["levels"]
+        self.limits = limits
+        """Unit and levels of each limit."""
         self._tables, self._dt = tables, dt
-        self.units = {name: str(data[name]["unit"]) for name in WATCHED}
-        """Unit of each margin for people."""
-        self.scales = np.array([UNIT_SCALE[unit] for unit in self.units.values()])
-        """SI value of one of it."""
         self._state = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
         self._worst = np.full(KIND.size, np.inf)
         self._outside = np.zeros(KIND.size, dtype=np.int64)
@@ -109,15 +103,15 @@ class LimitLevels:
         margins, levels = np.empty((len(sensors), KIND.size)), np.empty((len(sensors), KIND.size))
         monitor_kernels.watch(self._tables, sensors, ahead, self._dt, self._state, margins, levels)
         self._worst = np.minimum(self._worst, margins.min(axis=0, initial=np.inf))
-        self._outside += np.count_nonzero(margins < self._tables.threshold[:, 2], axis=0)
+        self._outside += np.count_nonzero(margins < self.limits.threshold[:, 2], axis=0)
         return margins, levels
 
     def summary(self) -> dict[str, dict[str, Any]]:
         """Least margin, its unit, and time beyond the limit by limit, as ``rtsim fly --json`` prints them."""
         return {
             name: {
-                "worst_margin": float(self._worst[k] / self.scales[k]),
-                "unit": self.units[name],
+                "worst_margin": float(self._worst[k] / self.limits.scale[k]),
+                "unit": self.limits.units[k],
                 "outside_s": int(self._outside[k]) * self._dt,
             }
             for k, name in enumerate(WATCHED)
@@ -141,9 +135,10 @@ class MarginMonitor:
         database = load_database() if database is None else database
         self.dt = dt
         self.tables = monitor_tables(boundary, database)
+        self._limits = load_levels(database.profile)
         self._law = law_tables("monitor", database, dt=dt, boundary=boundary)
         self._law_state = np.zeros(law_data.LAW_STATE_SIZE)
-        self._levels = LimitLevels(self.tables, dt)
+        self._levels = MarginWatch(self.tables, self._limits, dt)
         self._work = np.zeros(law_data.WORK_SIZE)
         self._frame = 0
         self.reset()
@@ -192,7 +187,7 @@ class MarginMonitor:
         ahead, side, distance = np.zeros(frames), np.zeros(frames), np.zeros(frames)
         monitor_kernels.predict(self._law, sensors, acting, ahead, side)
         monitor_kernels.distances(self.tables, sensors, distance)
-        watch = LimitLevels(self.tables, self.dt)
+        watch = MarginWatch(self.tables, self._limits, self.dt)
         time, (margins, levels) = rows[:, COLUMN.time_s].copy(), watch.look(sensors, ahead)
         return MarginHistory(time, margins, levels, distance, ahead, side, watch.summary())
 
@@ -204,10 +199,11 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         boundary: The corridor to watch.
         database: The plant whose trims the chart is compared with.
     """
-    corridor, limits, data = load_boundary(boundary, database), load_limits(), protection_data()["levels"]
-    scale = [UNIT_SCALE[data[name]["unit"]] for name in WATCHED]
-    threshold = np.array([[s * value for value in data[n]["threshold"]] for n, s in zip(WATCHED, scale, strict=True)])
-    hysteresis = np.array([s * data[n]["hysteresis"] for n, s in zip(WATCHED, scale, strict=True)])
+    corridor, limits, levels = (
+        load_boundary(boundary, database),
+        load_limits(database.profile),
+        load_levels(database.profile),
+    )
     return MonitorTables(
         chart=sample_boundary(corridor),
         corners=corridor.tables(),
@@ -215,16 +211,16 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         torque=limits.torque,
         sink=limits.sink,
         numbers=np.array([getattr(limits, name) for name in LIMIT.asdict()]),
-        threshold=threshold,
-        hysteresis=hysteresis,
-        rise=data["rise_s"],
-        fall=data["fall_s"],
+        threshold=levels.threshold,
+        hysteresis=levels.hysteresis,
+        rise=levels.rise,
+        fall=levels.fall,
     )
 
 
 def compile_watch() -> None:
     """Compile, or load, what watches the rows of a flight."""
-    LimitLevels(monitor_tables("design", load_database()), 0.004)
+    MarginWatch(monitor_tables("design", load_database()), load_levels(), 0.004)
 
 
 def sensor_array(sensors: Sensors) -> FloatArray:

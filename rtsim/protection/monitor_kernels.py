@@ -42,14 +42,22 @@ LIMIT_WORDS = {
     "time_to_limit": "time to the corridor's boundary",
 }
 """Limits in words for people, in the order of the recorded reasons (a reason is a limit's place plus one), and last the
-time to the corridor's boundary. A new limit, before the last, has its margin in ``limit_margins``, its numbers in
-``data/protection.toml`` under ``[limits]`` (read there by the names of ``LIMIT``), its levels under ``[levels]``."""
+time to the corridor's boundary. A new limit, before the last, has its margin in ``limit_margins``, a number in
+``LIMIT_NUMBERS``, and in an aircraft's ``protection`` that number and its levels."""
 KIND = Places(*LIMIT_WORDS)
 """Places of the margins and levels."""
-LIMIT = Places(
-    "flapping", "load_factor_max", "load_factor_min", "pitch", "nacelle_forward", "nacelle_aft", "nacelle_rate"
-)
-"""Places of the limits' numbers, keys of ``[limits]`` without their units; SI and radians."""
+LIMIT_NUMBERS = {
+    "flapping": ("flapping_deg", 0.1, 60.0),
+    "load_factor_max": ("load_factor_max", 1.0, 20.0),
+    "load_factor_min": ("load_factor_min", -20.0, 1.0),
+    "pitch": ("pitch_deg", 1.0, 80.0),
+    "nacelle_forward": ("nacelle_forward_deg", 0.0, 95.0),
+    "nacelle_aft": ("nacelle_aft_deg", 0.0, 95.0),
+    "nacelle_rate": ("nacelle_rate_deg_s", 0.1, 60.0),
+}
+"""Limits that are numbers: key under ``[limits]`` of an aircraft's profile, least and largest value allowed there."""
+LIMIT = Places(*LIMIT_NUMBERS)
+"""Their places; SI and radians."""
 LEVEL_STATE_SIZE = KIND.size * 6
 FAR = 1e3
 """A margin where the limit does not apply."""

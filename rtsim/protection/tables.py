@@ -39,25 +39,26 @@ def law_tables(
         database: The aircraft the law knows.
         dt: Length of a frame [s].
         boundary: The corridor it keeps to; its low side is tightened to what the plant can trim.
-        settings: The law's numbers; None: those of ``data/protection.toml``.
+        settings: The law's numbers; None: the aircraft's.
 
     Raises:
-        InputError: There is no such law or boundary.
+        InputError: There is no such law or boundary, or the aircraft's profile lacks a number.
     """
     if law not in LAW_NAMES:
         raise InputError("no such built-in law", key="protection", value=law, allowed=", ".join(LAW_NAMES))
-    limits = load_limits()
+    profile = database.profile
+    limits = load_limits(profile)
     corridor = load_boundary(boundary, database)
     if law in {"governor", "full"}:
         corridor = guarded_corridor(corridor, database, limits.plant_guard)
     return ProtectionTables(
         law=LAW_NAMES.index(law),
-        every=frames_per_decision(dt),
-        model=reduce_model(database, load_weights()),
+        every=frames_per_decision(profile, dt=dt),
+        model=reduce_model(database, load_weights(profile)),
         corridor=sample_boundary(corridor),
         torque=limits.torque,
         sink=limits.sink,
-        settings=load_settings(dt=dt) if settings is None else settings,
+        settings=load_settings(profile, dt=dt) if settings is None else settings,
     )
 
 

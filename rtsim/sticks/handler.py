@@ -124,7 +124,7 @@ class StickHandler:
         """
         self.settings = settings
         self._switch.tables = self._tables._replace(
-            switch_rate=settings.nacelle_rate,
+            switch_rate=min(self._tables.switch_rate, settings.nacelle_rate),
             slow_rate_forward=min(self._tables.slow_rate_forward, settings.nacelle_rate),
             slow_rate_aft=min(self._tables.slow_rate_aft, settings.nacelle_rate),
         )

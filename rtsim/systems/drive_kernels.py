@@ -39,6 +39,8 @@ class DriveTables(NamedTuple):
     """Time constant with which the governor brings the rotor speed back [s]."""
     lowest: float
     """Slowest rotor speed that can be flown [rad/s]."""
+    efficiency: float
+    """Shaft power of the rotors over engine power."""
     highest: float
     """Fastest rotor speed that can be flown [rad/s]."""
 

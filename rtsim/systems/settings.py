@@ -1,61 +1,81 @@
-"""Tables of flaps and rotor drive, from ``data/systems.toml`` and the aircraft's data."""
+"""Tables of flaps and rotor drive, from an aircraft's profile."""
 
 from __future__ import annotations
 
-import tomllib
-from functools import cache
-from importlib import resources
-from typing import Any
-
 import numpy as np
 
-from rtsim.aircraft.xv15.tables import AircraftTables
-from rtsim.faults.fault import ENGINE_RATING, TRANSMISSION_EFFICIENCY
+from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.aircraft.xv15.model import Xv15
+from rtsim.faults.fault import engine_rating, transmission_efficiency
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
 from rtsim.units import deg
 
-ENGINES = 2
 ROTORS = 2
-FULL_POWER = ENGINES * ENGINE_RATING["contingency"] * TRANSMISSION_EFFICIENCY
-"""Shaft power of both engines at their contingency rating [W]."""
 
 
-@cache
-def _data() -> dict[str, Any]:
-    text = resources.files("rtsim.aircraft.xv15").joinpath("data", "systems.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
-
-
-def load_flap_tables(aircraft: AircraftTables) -> FlapTables:
+def load_flap_tables(profile: AircraftProfile | None = None) -> FlapTables:
     """The flaps of an aircraft.
 
     Args:
-        aircraft: The nonlinear aircraft's tables: flap settings.
+        profile: The aircraft; None: the XV-15.
+
+    Raises:
+        InputError: A value is missing or out of range.
     """
-    return FlapTables(nodes=aircraft.wing.flap_nodes, rate=deg(float(_data()["flaps"]["rate_deg_s"])))
+    flaps = (xv15_profile() if profile is None else profile).systems.table("flaps")
+    # The inputs of the aircraft are the parts of the deflection between these settings.
+    nodes = np.radians(flaps.numbers("settings_deg", low=0.0, high=90.0, count=4, rises=True))
+    return FlapTables(nodes=nodes, rate=deg(flaps.number("rate_deg_s", low=0.01, high=100.0)))
 
 
-def load_drive_tables(aircraft: AircraftTables) -> DriveTables:
-    """The rotor drive of an aircraft.
-
-    The inertia is that of the blades about the shaft, which for these slender blades is that about the flapping hinge;
-    hubs, transmission and turbines would add to it and were not found.
+def all_engines_power(profile: AircraftProfile | None = None) -> float:
+    """Power of all engines at their highest rating [W].
 
     Args:
-        aircraft: The nonlinear aircraft's tables: blades, governed rotor speed.
+        profile: The aircraft; None: the XV-15.
+
+    Raises:
+        InputError: A value is missing or out of range.
     """
-    data = _data()
-    rotor, speed = aircraft.rotor, aircraft.configuration.rotor_speed
-    engine, limits = data["engine"], data["rotor_speed"]
-    throttle = np.asarray(engine["throttle_deg"], dtype=np.float64)
+    aircraft = xv15_profile() if profile is None else profile
+    return aircraft.systems.table("engine").number("engines", low=1, high=8) * engine_rating(aircraft, "contingency")
+
+
+def load_drive_tables(profile: AircraftProfile | None = None, *, governed_speed: float = 0.0) -> DriveTables:
+    """The rotor drive of an aircraft.
+
+    The XV-15's inertia is that of the blades about the shaft, which for these slender blades is that about the flapping
+    hinge; hubs, transmission and turbines would add to it and were not found.
+
+    Args:
+        profile: The aircraft; None: the XV-15.
+        governed_speed: Rotor speed that the governor holds [rad/s]; 0: the XV-15's.
+
+    Raises:
+        InputError: A value is missing or out of range.
+    """
+    aircraft = xv15_profile() if profile is None else profile
+    part = aircraft.systems
+    engine, limits, rotors = part.table("engine"), part.table("rotor_speed"), part.table("rotors")
+    xv15 = Xv15.load().tables
+    speed = governed_speed or xv15.configuration.rotor_speed
+    if rotors.has("nonlinear_model"):
+        inertia = ROTORS * xv15.rotor.blades * xv15.rotor.blade_inertia
+    else:
+        inertia = rotors.number("inertia_kg_m2", low=0.1, high=1e7)
+    lever = np.asarray(engine.numbers("lever_in", low=0.0, high=1e3, rises=True))
+    throttle = np.asarray(engine.numbers("throttle_deg", low=0.0, high=1e3, count=len(lever), rises=True))
+    efficiency = transmission_efficiency(aircraft)
+    full = all_engines_power(aircraft) * efficiency
     return DriveTables(
         governed_speed=speed,
-        inertia=ROTORS * rotor.blades * rotor.blade_inertia,
-        lever=np.asarray(engine["lever_in"], dtype=np.float64) / float(engine["lever_travel_in"]),
-        power=FULL_POWER * (throttle - throttle[0]) / (throttle[-1] - throttle[0]),
-        lag=float(engine["power_lag_s"]),
-        recovery=float(data["governor"]["recovery_s"]),
-        lowest=float(limits["lowest_fraction"]) * speed,
-        highest=float(limits["highest_fraction"]) * speed,
+        inertia=inertia,
+        lever=lever / engine.number("lever_travel_in", low=0.1, high=1e3),
+        power=full * (throttle - throttle[0]) / (throttle[-1] - throttle[0]),
+        lag=engine.number("power_lag_s", low=0.0, high=60.0),
+        recovery=part.table("governor").number("recovery_s", low=0.01, high=60.0),
+        lowest=limits.number("lowest_fraction", low=0.1, high=1.0) * speed,
+        efficiency=efficiency,
+        highest=limits.number("highest_fraction", low=1.0, high=2.0) * speed,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from rtsim.choices import CorridorName
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.loop.options import FlightOptions
+from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metric_kernels import VALUE
 from rtsim.protection.laws import LawSpec, load_laws
 from rtsim.protection.tables import LAW_NAMES
@@ -62,6 +64,8 @@ class Task:
     """What all flights have in common."""
     folder: str = ""
     """Where modules of laws are looked for besides the installed ones."""
+    aircraft_hash: str = ""
+    """Hash of the aircraft, which a worker must have too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +116,12 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
     Args:
         task: The campaign.
         chunk: The piece.
+
+    Raises:
+        InputError: This worker has another aircraft.
     """
     spec = _spec(task.text, task.file)
+    _refuse_another(task)
     bench = Bench()
     metrics = np.zeros((chunk.count, len(task.laws), VALUE.size))
     seconds = np.zeros(len(task.laws))
@@ -147,20 +155,22 @@ def fly_law(
     if law.compiled:
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
-        laws = _python_laws(law.name, folder, plan.setup.options.corridor or TRIAL_CORRIDOR)
+        options = plan.setup.options
+        laws = _python_laws(law.name, folder, options.corridor or TRIAL_CORRIDOR, options.database)
         return bench.fly(plan, laws, repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
 
 
-def law_chain(name: str, folder: str, boundary: CorridorName = "flight") -> Sequence[LawSpec]:
+def law_chain(name: str, folder: str, boundary: CorridorName = "flight", database: str = "") -> Sequence[LawSpec]:
     """Find a law, or several separated by commas.
 
     Args:
         name: What the user wrote.
         folder: Where modules are looked for besides the installed ones.
         boundary: Corridor that built-in laws of a chain keep to.
+        database: LPV database of the aircraft that they know, a file; empty: the shipped XV-15.
 
     Raises:
         InputError: There is no such law.
@@ -169,12 +179,12 @@ def law_chain(name: str, folder: str, boundary: CorridorName = "flight") -> Sequ
 
     if folder and folder not in sys.path:
         sys.path.insert(0, folder)
-    return load_laws(name, boundary=boundary)
+    return load_laws(name, boundary=boundary, database=database)
 
 
 @functools.lru_cache(maxsize=8)
-def _python_laws(name: str, folder: str, boundary: CorridorName) -> Sequence[LawSpec]:
-    return law_chain(name, folder, boundary)
+def _python_laws(name: str, folder: str, boundary: CorridorName, database: str) -> Sequence[LawSpec]:
+    return law_chain(name, folder, boundary, database)
 
 
 @functools.lru_cache(maxsize=4)
@@ -183,6 +193,26 @@ def _spec(text: str, file: str) -> CampaignFile:
     if spec is None:
         raise problems[0]
     return spec
+
+
+def _refuse_another(task: Task) -> None:
+    """Refuse to fly where the aircraft is another than the campaign's."""
+    log = logging.getLogger("rtsim.lpv.files.storage")
+    level, database = log.level, task.options.database
+    log.setLevel(logging.ERROR)  # what the aircraft borrows was said where the campaign was started
+    try:
+        present = load_database(database or None).aircraft_hash
+    finally:
+        log.setLevel(level)
+    if task.aircraft_hash != present:
+        raise InputError(
+            "a worker has another aircraft than the campaign",
+            file=database or None,
+            key="database",
+            value=present[:12],
+            allowed=task.aircraft_hash[:12],
+            mend="give every worker the same database, profile and version of rtsim",
+        )
 
 
 def present_folder() -> str:

@@ -16,6 +16,7 @@ from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.loop.setup import FlightSetup
+from rtsim.lpv.files.storage import load_database
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
@@ -44,14 +45,16 @@ def draw_plan(
         InputError: No start of the class lies inside the corridor.
     """
     item = spec.classes[class_number]
+    common = options or FlightOptions(**given(spec))
     generator = stream_generator(seed, STREAM_CAMPAIGN, class_number, run)
     if item.scenarios:
         scenario = load_scenario(item.scenarios[int(generator.integers(len(item.scenarios)))])
         programme, start = scenario.programme, scenario.start
         duration = scenario.duration if item.duration_s is None else item.duration_s
     else:
-        start = _start(item, spec.corridor, generator)
-        programme = _programme(item, start, load_boundary(spec.corridor), generator)
+        corridor = load_boundary(spec.corridor, load_database(common.database or None))
+        start = _start(item, corridor, common.database, generator)
+        programme = _programme(item, start, corridor, generator)
         duration = spec.duration_s if item.duration_s is None else item.duration_s
     pulses = tuple(pulse for table in item.pulses for pulse in _pulses(table, generator))
     faults = tuple(_faults(item, generator))
@@ -64,7 +67,7 @@ def draw_plan(
     drawn |= {"pilot_noise": item.pilot.noise, "seed": int(generator.integers(2**62))}
     setup = FlightSetup(
         programme=programme,
-        options=dataclasses.replace(options or FlightOptions(**given(spec)), **drawn),
+        options=dataclasses.replace(common, **drawn),
         start=start,
         air=AirSpecification(turbulence=turbulence, gusts=gusts),
         faults=faults,
@@ -84,10 +87,9 @@ def _options(item: ClassTable, generator: Generator) -> dict[str, Any]:
     }
 
 
-def _start(item: ClassTable, corridor_name: str, generator: Generator) -> ProgrammePoint:
+def _start(item: ClassTable, corridor: Corridor, database: str, generator: Generator) -> ProgrammePoint:
     table = item.start
     assert table is not None  # the file was checked
-    corridor = load_boundary(corridor_name)
     for _ in range(ATTEMPTS):
         nacelle = float(np.clip(draw(table.nacelle_deg, generator), 0.0, 90.0))
         angle = deg(nacelle)
@@ -100,7 +102,7 @@ def _start(item: ClassTable, corridor_name: str, generator: Generator) -> Progra
             airspeed = low + kt(draw(table.above_low_kt, generator))
         altitude = draw(table.altitude_m, generator)
         margin = min(airspeed - low, high - airspeed)
-        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle):
+        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle, database):
             return ProgrammePoint(airspeed, angle, altitude)
     raise InputError(
         f"no start of the class {item.name} lies inside the corridor and has a trim",
@@ -111,8 +113,8 @@ def _start(item: ClassTable, corridor_name: str, generator: Generator) -> Progra
 
 
 @functools.lru_cache(maxsize=64)
-def _has_trim(airspeed: float, angle: float) -> bool:
-    return has_trim("lpv", airspeed, angle)
+def _has_trim(airspeed: float, angle: float, database: str) -> bool:
+    return has_trim("lpv", airspeed, angle, database=database)
 
 
 def _programme(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> Programme:

@@ -15,6 +15,7 @@ import rtsim
 from rtsim.errors import InputError
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
+from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metric_kernels import VALUE
 from scenarios.campaign.chunks import (
     ChunkResult,
@@ -94,6 +95,8 @@ class CampaignResult:
             "law": self.task.laws[0].label,
             "seed": self.task.seed,
             "plant": self.task.options.plant,
+            "database": self.task.options.database,
+            "database_hash": self.task.aircraft_hash,
             "corridor_name": self.task.options.corridor_name,
             "rate_hz": self.task.options.rate_hz,
             "runs": flown,
@@ -241,13 +244,15 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
             key="--against",
             mend=f"add --against {unknown[0]}",
         )
+    flown = FlightOptions(**given(spec, file)).changed(options.changes)
     return Task(
         text=text,
         file=file,
         laws=(*laws, LawVariant("off")),
         seed=options.seed,
-        options=FlightOptions(**given(spec, file)).changed(options.changes),
+        options=flown,
         folder=folder,
+        aircraft_hash=load_database(flown.database or None).aircraft_hash,
     )
 
 
@@ -257,7 +262,6 @@ def identity(task: Task) -> dict[str, Any]:
     Args:
         task: The campaign.
     """
-    from rtsim.lpv.files.storage import load_database
     from scenarios.flight.flight_setup import versions
 
     return {
@@ -268,7 +272,7 @@ def identity(task: Task) -> dict[str, Any]:
         "plant": task.options.plant,
         "rate_hz": task.options.rate_hz,
         "metrics": list(VALUE.asdict()),
-        "database": load_database(task.options.database or None).content_hash,
+        "database": task.aircraft_hash,
         "versions": versions() | {"rtsim": rtsim.__version__},
     }
 

@@ -16,6 +16,8 @@ from rtsim.loop.data import SimulationTables
 from rtsim.loop.script_kernels import S_YIELDED
 from rtsim.loop.setup import FlightSetup, build_parts, start_trim
 from rtsim.loop.simulation import Simulation
+from rtsim.lpv.files.storage import load_database
+from rtsim.lpv.flown import flown_database
 from rtsim.measures.metrics import TrialMetrics, measured
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
@@ -101,7 +103,7 @@ class Bench:
         chain = None
         if name is None:
             assert not isinstance(law, str)  # a name is a compiled law
-            chain = LawChain(law, dt=parts.tables.dt, remember=repeat)
+            chain = LawChain(law, dt=parts.tables.dt, remember=repeat, profile=parts.database.profile)
         simulation = Simulation(setup, parts=parts, laws=chain)
         if len(self._rows) < frames:
             self._rows = np.empty((frames, SIGNAL_COUNT))
@@ -113,7 +115,14 @@ class Bench:
             chain.unrepeatable()
         problems = () if chain is None else tuple(event.text for event in chain.events)
         yielded = bool(simulation.flying.state.script[S_YIELDED])
-        numbers = measured(rows, setup.programme, simulation.dt, ended=simulation.finished, yielded=yielded)
+        numbers = measured(
+            rows,
+            setup.programme,
+            simulation.dt,
+            profile=parts.database.profile,
+            ended=simulation.finished,
+            yielded=yielded,
+        )
         return TrialFlight(TrialMetrics(numbers), simulation.end_reason, rows.copy() if keep else rows, problems)
 
 
@@ -143,19 +152,18 @@ def _fly_by_hand(simulation: Simulation, pilot: Pilot, rows: FloatArray) -> Floa
     return rows[:flown]
 
 
-def has_trim(plant: PlantName, airspeed: float, nacelle: float) -> bool:
+def has_trim(plant: PlantName, airspeed: float, nacelle: float, *, database: str = "") -> bool:
     """Whether a flight can start somewhere.
 
     Args:
         plant: Aircraft model.
         airspeed: Airspeed [m/s].
         nacelle: Nacelle angle [rad].
+        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
     """
-    from rtsim.lpv.files.storage import load_database
-    from rtsim.lpv.flown import flown_database
-
+    aircraft = flown_database(load_database(database or None), database or None)
     try:
-        start_trim(plant == "nonlinear", flown_database(load_database()), airspeed, nacelle)
+        start_trim(plant == "nonlinear", aircraft, airspeed, nacelle)
     except InputError:
         return False
     return True

@@ -128,14 +128,14 @@ def automatic_nacelle(nacelle: str, settings: AutomaticSettings, programme: Prog
     """
     if nacelle != "automatic":
         return None
-    from rtsim.nacelle.automatic import AutomaticNacelle, NacelleSchedule, centre_line_schedule, programme_schedule
+    from rtsim.nacelle.automatic import AutomaticNacelle, NacelleSchedule, programme_schedule
 
     if settings.schedule == "points":
         schedule = NacelleSchedule(tuple(v for v, _ in settings.points), tuple(n for _, n in settings.points))
     elif settings.schedule == "programme":
         schedule = programme_schedule(programme)
     else:
-        schedule = centre_line_schedule()
+        schedule = None  # the centre line of whichever aircraft flies
     return AutomaticNacelle(
         schedule=schedule, rate=settings.rate, acceleration=settings.acceleration, detents=settings.detents
     )

@@ -52,9 +52,9 @@ def corridor_outline(name: str, database: str = "") -> CorridorOutline:
 
     Args:
         name: ``design``, ``flight`` or ``model``.
-        database: LPV database that ``model`` is computed from, a file; empty: the shipped XV-15.
+        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
     """
-    corridor = load_boundary(name, load_database(database) if database and name == "model" else None)
+    corridor = load_boundary(name, load_database(database) if database else None)
     high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
     high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
     high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]

@@ -54,7 +54,7 @@ class Hands:
         self._settings = StickSettings()
         for name, value in link.config.parameters.items():
             self._settings = self._settings.with_parameter(name, value)
-        self._schedule = transition_schedule(load_boundary(simulation.setup.options.corridor_name))
+        self._schedule = transition_schedule(load_boundary(simulation.setup.options.corridor_name, simulation.database))
         self._waits = waits
         self._deferred: list[Request] = []
         self._frames = 0
@@ -161,7 +161,12 @@ class Hands:
     def _begin(self, simulation: Simulation) -> None:
         command = simulation.pilot_command()
         self._acting = (command.stick, command.lever)
-        self._handler = StickHandler(self._settings, start=Command(0.0, command.lever, 0.0), schedule=self._schedule)
+        self._handler = StickHandler(
+            self._settings,
+            start=Command(0.0, command.lever, 0.0),
+            schedule=self._schedule,
+            tables=simulation.tables.nacelle,
+        )
         sensors = simulation.sensors()
         self._angle, self._airspeed = sensors.nacelle_angle, sensors.airspeed
         self._waiting = self._waits

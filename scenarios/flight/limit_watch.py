@@ -16,8 +16,8 @@ from rtsim.corridor import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection.limits import LIMIT_KINDS
-from rtsim.protection.monitor import WATCHED, LimitLevels, monitor_tables, sensors_of_rows
+from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
+from rtsim.protection.monitor import MarginWatch, monitor_tables, sensors_of_rows
 from rtsim.protection.monitor_kernels import KIND, LIMIT_WORDS, MonitorTables
 from telemetry.log.format import LogEvent
 
@@ -47,7 +47,8 @@ class LimitWatch:
             dt: Length of a frame [s].
             database: LPV database of the aircraft, a file; empty: the shipped XV-15.
         """
-        self._levels = LimitLevels(_tables(corridor_name, load_database(database or None)), dt)
+        aircraft = load_database(database or None)
+        self._levels = MarginWatch(_tables(corridor_name, aircraft), load_levels(aircraft.profile), dt)
         self._dt, self._tell = dt, tell
         self._noted: list[LogEvent] = []
         self._waiting = np.empty((BATCH_ROWS, SIGNAL_COUNT))
@@ -128,18 +129,19 @@ class LimitWatch:
         if name in _TOLD_ELSEWHERE or 0 < level < before:
             return
         words = LIMIT_WORDS[name]
-        margin /= float(self._levels.scales[kind])
-        unit = f" {self._levels.units[name]}".rstrip()
+        margin /= float(self._levels.limits.scale[kind])
+        unit = self._levels.limits.units[kind]
+        shown = f" {unit}".rstrip()
         if level == 0:
             text = f"{words} clear again"
         elif name == "time_to_limit":
             side = "low" if row[COLUMN.margin_low_kt] < row[COLUMN.margin_high_kt] else "high"
             text = f"the corridor's {side}-speed side is {margin:.1f} s ahead as the controls are"
         elif margin >= 0.0:
-            text = f"{words} {LEVEL_NAMES[level]}: {margin:.1f}{unit} left"
+            text = f"{words} {LEVEL_NAMES[level]}: {margin:.1f}{shown} left"
         else:
-            text = f"{words} {LEVEL_NAMES[level]}: {-margin:.1f}{unit} beyond the limit"
-        data = {"limit": name, "level": level, "margin": margin, "unit": self._levels.units[name]}
+            text = f"{words} {LEVEL_NAMES[level]}: {-margin:.1f}{shown} beyond the limit"
+        data = {"limit": name, "level": level, "margin": margin, "unit": unit}
         self._say(row, "limit", text, "info" if level == 0 else LEVEL_NAMES[level], data)
 
     def _watch_protection(self, rows: FloatArray) -> None:

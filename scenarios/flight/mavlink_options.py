@@ -11,11 +11,13 @@ import rtsim
 from rtsim.aids import SWITCHES
 from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
+from rtsim.lpv.files.storage import load_database
+from rtsim.protection.limits import load_limits
 from rtsim.sticks import StickSettings
-from rtsim.units import deg
+from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
 from telemetry.mavlink import HomePosition, MavlinkConfig
-from telemetry.mavlink.config import endpoints
+from telemetry.mavlink.config import Ratings, endpoints
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
@@ -75,6 +77,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         bind_port=port,
         autopilot=options.autopilot,
         rate_hz=float(scenario.options.rate_hz),
+        ratings=_ratings(scenario.options.database),
         home=options.home,
         aids={name: name in aids_on for name in SWITCHES},
         parameters=stick_settings(stick_map).parameters(),
@@ -87,6 +90,21 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         version=rtsim.__version__,
     )
     return config, warning
+
+
+def _ratings(database: str) -> Ratings:
+    """Full torque and rotor speed of an aircraft; the shipped one's need not wait for its database."""
+    if not database:
+        return Ratings()
+    aircraft = load_database(database)
+    torque = load_limits(aircraft.profile).torque
+    return Ratings(
+        torque_inlb=torque.cruise / INCH_POUND,
+        hover_torque_inlb=torque.takeoff / INCH_POUND,
+        hover_nacelle_deg=to_deg(torque.takeoff_nacelle),
+        hover_airspeed_kt=to_kt(torque.takeoff_airspeed),
+        rotor_speed_rpm=to_rpm(aircraft.rotor_speed) if aircraft.rotor_speed > 0.0 else Ratings().rotor_speed_rpm,
+    )
 
 
 def stick_settings(stick_map: VehicleMap) -> StickSettings:

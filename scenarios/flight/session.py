@@ -76,7 +76,7 @@ class FlightSession:
         self._next_due = 0
         self._failures = [
             (max(0, math.ceil(event.time / simulation.dt - 1e-9)), event)
-            for event in fault_events(simulation.setup.faults)
+            for event in fault_events(simulation.setup.faults, simulation.database.profile)
         ]
         self._next_failure = 0
         self._pilot_factory, self._pilot_name = pilot_factory, pilot_name

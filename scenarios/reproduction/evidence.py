@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from rtsim.corridor import load_corridor
 from rtsim.frame import FloatArray
+from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import AccelerationCaps, path_through
 from rtsim.optimization.paths import centre_line_corners, trim_flapping_map
 from rtsim.units import deg, kt, to_deg, to_kt
@@ -40,9 +41,13 @@ class Evidence:
     """Numbers that do not come from the paths' flights, by claim."""
 
 
-def valley_and_ridges() -> dict[str, Number]:
-    """Where the map of trimmed flapping is high and low inside the design corridor (Figure 6)."""
-    airspeeds, nacelles, flapping = trim_flapping_map()
+def valley_and_ridges(database: str = "") -> dict[str, Number]:
+    """Where the map of trimmed flapping is high and low inside the design corridor (Figure 6).
+
+    Args:
+        database: LPV database, a file; empty: the shipped XV-15.
+    """
+    airspeeds, nacelles, flapping = trim_flapping_map(load_database(database or None))
     corridor = load_corridor("design")
     found: dict[str, Number] = {}
     positions, ridges = [], True
@@ -87,12 +92,15 @@ def corridor_differences(reference: Mapping[str, list[float]]) -> dict[str, Numb
     }
 
 
-def grid_errors() -> dict[str, dict[str, Number]]:
-    """How well each linear model predicts its neighbour's trim, on our grid and on one of 10 kn (Figure 2)."""
-    from rtsim.lpv.building.checks import check_neighbours
-    from rtsim.lpv.files.storage import load_database
+def grid_errors(file: str = "") -> dict[str, dict[str, Number]]:
+    """How well each linear model predicts its neighbour's trim, on our grid and on one of 10 kn (Figure 2).
 
-    database = load_database()
+    Args:
+        file: LPV database; empty: the shipped XV-15.
+    """
+    from rtsim.lpv.building.checks import check_neighbours
+
+    database = load_database(file or None)
     corridor = load_corridor("design")
     level = database.level_layer
     inside = np.array([[corridor.inside(float(v), float(n)) for n in database.nacelle] for v in database.airspeed])
@@ -173,15 +181,19 @@ def centre_line_demand(acceleration_kt_s: float) -> float:
     return float((tilt[moving] / airspeed[moving]).max() * acceleration_kt_s)
 
 
-def twelve_seconds() -> dict[str, Number]:
-    """The nacelles' whole travel at their fastest, and the nonlinear aircraft flown through it (section 2)."""
+def twelve_seconds(database: str = "") -> dict[str, Number]:
+    """The nacelles' whole travel at their fastest, and the nonlinear aircraft flown through it (section 2).
+
+    Args:
+        database: LPV database that the pilot knows, a file; empty: the shipped XV-15.
+    """
     from rtsim.nacelle import NacelleActuator
 
     actuator, dt, time = NacelleActuator(deg(90.0)), 0.004, 0.0
     while actuator.angle > deg(0.5) and time < 60.0:
         actuator.step(-deg(FASTEST_RATE_DEG_S), dt)
         time += dt
-    gentle, hard = _tilted_in_twelve_seconds(80.0, 120.0), _tilted_in_twelve_seconds(60.0, 150.0)
+    gentle, hard = (_tilted_in_twelve_seconds(begin, end, database) for begin, end in ((80.0, 120.0), (60.0, 150.0)))
     return {
         "nacelle_time_s": time,
         "lag_s": time - 90.0 / FASTEST_RATE_DEG_S,
@@ -195,7 +207,7 @@ def twelve_seconds() -> dict[str, Number]:
     }
 
 
-def _tilted_in_twelve_seconds(start_kt: float, end_kt: float) -> Flight:
+def _tilted_in_twelve_seconds(start_kt: float, end_kt: float, database: str) -> Flight:
     """Fly the nonlinear aircraft from upright to the downstop at the nacelles' fastest rate."""
     path = path_through(
         "twelve_seconds",
@@ -205,7 +217,7 @@ def _tilted_in_twelve_seconds(start_kt: float, end_kt: float) -> Flight:
         caps=AccelerationCaps.uniform(7.6),
         nacelle_motion="spread",
     )
-    return Flyer(Variant(name="nonlinear", title="", plant="nonlinear")).fly(path.name, path)
+    return Flyer(Variant(name="nonlinear", title="", plant="nonlinear", database=database)).fly(path.name, path)
 
 
 def lpv_differences(layered: Flight, plain: Flight, truth: Flight) -> dict[str, Number]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rtsim.corridor import load_corridor
+from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.paths import trim_flapping_map
 from rtsim.units import to_deg, to_kt
 from scenarios.reproduction.drawing import (
@@ -52,10 +53,8 @@ def _centre_line(axes: Axes, colour: str = GREY) -> None:
     axes.plot(centre, nacelle, color=colour, linewidth=1.2, linestyle="-.", label="centre line")
 
 
-def _grid(study: Study, figure: Figure) -> None:  # noqa: ARG001
-    from rtsim.lpv.files.storage import load_database
-
-    database = load_database()
+def _grid(study: Study, figure: Figure) -> None:
+    database = load_database(study.database or None)
     axes = figure.subplots()
     draw_corridor(axes)
     valid = database.valid[database.level_layer]
@@ -138,8 +137,8 @@ def _typical_flapping(study: Study, figure: Figure) -> None:
     axes.legend(loc="upper right")
 
 
-def _map(axes: Axes, figure: Figure) -> None:
-    speed, nacelle, flapping = trim_flapping_map()
+def _map(study: Study, axes: Axes, figure: Figure) -> None:
+    speed, nacelle, flapping = trim_flapping_map(load_database(study.database or None))
     shown = (speed >= 0.0) & (speed <= 180.0)
     levels = np.arange(0.0, 6.01, 0.5)
     values = np.ma.masked_invalid(np.minimum(flapping[shown], 6.0)).T
@@ -149,16 +148,16 @@ def _map(axes: Axes, figure: Figure) -> None:
     figure.colorbar(picture, ax=axes, label="trimmed cyclic flapping, deg")
 
 
-def _flapping_map(study: Study, figure: Figure) -> None:  # noqa: ARG001
+def _flapping_map(study: Study, figure: Figure) -> None:
     axes = figure.subplots()
     draw_corridor(axes)
-    _map(axes, figure)
+    _map(study, axes, figure)
 
 
 def _fast_path(study: Study, figure: Figure) -> None:
     axes = figure.subplots()
     draw_corridor(axes)
-    _map(axes, figure)
+    _map(study, axes, figure)
     draw_path(axes, study, "fast_side", colour=RED, label="least trimmed flapping, flown")
     draw_path(axes, study, "typical", colour=ORANGE, label="Table 1, flown", corners=False)
     axes.legend(loc="lower left")

@@ -6,15 +6,17 @@ import dataclasses
 import math
 from dataclasses import dataclass
 
+from rtsim.aircraft.profile import xv15_profile
 from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.choices import OuterLoop, PlantName
 from rtsim.frame import SIGNAL_NAMES, FloatArray
 from rtsim.loop.setup import FlightSetup, build_parts
 from rtsim.loop.simulation import Simulation
+from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import TABLE_1_CAPS, ConversionPath
 from rtsim.optimization.paths import centre_line, centre_line_variable, fast_side, near_stall, table_1
 from rtsim.pilot.layout_kernels import PilotTables
-from rtsim.pilot.weights import PilotSettings
+from rtsim.pilot.weights import PilotSettings, pilot_settings
 from rtsim.programme import Programme
 
 RATE_HZ = 250
@@ -34,12 +36,16 @@ class Variant:
     outer_loop: OuterLoop = "integrators"
     """How the pilot holds airspeed and altitude."""
     pilot: PilotSettings | None = None
-    """Pilot settings other than the shipped ones; the gains are then designed anew."""
+    """Pilot settings other than the aircraft's; the gains are then designed anew."""
     turbulence: float = 0.0
     """Wind at 20 ft that sets the turbulence [m/s]; 0 is calm."""
     seed: int = 0
     """Root of the turbulence."""
+    database: str = ""
+    """LPV database that is flown, a file; empty: the shipped XV-15."""
 
+
+SLOW_PILOT = dataclasses.replace(pilot_settings(xv15_profile()), delay=0.25)
 
 BASELINE = Variant(name="baseline", title="layered LPV, MOCM with integrators")
 VARIANTS: tuple[Variant, ...] = (
@@ -47,22 +53,28 @@ VARIANTS: tuple[Variant, ...] = (
     Variant(name="nonlinear", title="the nonlinear model", plant="nonlinear"),
     Variant(name="two-variable", title="the paper's two-variable LPV", plant="lpv-plain"),
     Variant(name="pi", title="the paper's outer PI loops", outer_loop="pi"),
-    Variant(name="slow-pilot", title="a pilot with 0.25 s of delay", pilot=PilotSettings(delay=0.25)),
+    Variant(name="slow-pilot", title="a pilot with 0.25 s of delay", pilot=SLOW_PILOT),
 )
 """What every claim about a flight is judged on; the first one counts, the others show how far it carries."""
 
 
-def paper_paths() -> dict[str, ConversionPath]:
-    """The paths of the paper's figures by name, and three more that show causes."""
+def paper_paths(database: str = "") -> dict[str, ConversionPath]:
+    """The paths of the paper's figures by name, and three more that show causes.
+
+    Args:
+        database: LPV database whose trims the path of least flapping follows, a file; empty: the shipped XV-15.
+    """
+    aircraft = load_database(database) if database else None
+    hurried = fast_side(caps=TABLE_1_CAPS, aircraft=aircraft)
     return {
         "typical": dataclasses.replace(table_1(), name="typical", nacelle_motion="spread"),
         "typical_3deg": dataclasses.replace(table_1(nacelle_rate_deg_s=3.0), name="typical_3deg"),
         "typical_8deg": dataclasses.replace(table_1(nacelle_rate_deg_s=8.0), name="typical_8deg"),
-        "fast_side": fast_side(),
+        "fast_side": fast_side(aircraft=aircraft),
         "near_stall": near_stall(),
         "centre_line": centre_line(),
         "centre_line_variable": centre_line_variable(),
-        "fast_side_table_1_caps": dataclasses.replace(fast_side(caps=TABLE_1_CAPS), name="fast_side_table_1_caps"),
+        "fast_side_table_1_caps": dataclasses.replace(hurried, name="fast_side_table_1_caps"),
         "near_stall_table_1_caps": dataclasses.replace(near_stall(caps=TABLE_1_CAPS), name="near_stall_table_1_caps"),
         "centre_line_variable_3": dataclasses.replace(
             centre_line_variable(acceleration_kt_s=3.0), name="centre_line_variable_3"
@@ -82,6 +94,8 @@ class Flight:
     """The frame history, shape (frames, SIGNAL_COUNT)."""
     end_reason: str
     """Why it ended before its time; empty where it was completed."""
+    database: str = ""
+    """LPV database that was flown, a file; empty: the shipped XV-15."""
 
     def __getitem__(self, signal: str) -> FloatArray:
         """One signal over the flight, shape (frames,), in the unit of its name.
@@ -128,23 +142,26 @@ class Flyer:
         if variant.turbulence:
             air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=variant.turbulence))
         setup = FlightSetup(programme=programme, air=air).with_options(
-            plant=variant.plant, outer_loop=variant.outer_loop, rate_hz=RATE_HZ, seed=variant.seed
+            plant=variant.plant,
+            outer_loop=variant.outer_loop,
+            rate_hz=RATE_HZ,
+            seed=variant.seed,
+            database=variant.database,
         )
         parts = build_parts(setup)
         if self._pilot is not None:
             parts = dataclasses.replace(parts, tables=parts.tables._replace(pilot=self._pilot))
         simulation = Simulation(setup, parts=parts)
         rows = simulation.run(max(1, math.ceil(programme.duration * RATE_HZ - 1e-6)))
-        return Flight(name, programme, rows, simulation.end_reason)
+        return Flight(name, programme, rows, simulation.end_reason, variant.database)
 
 
 def _designed_pilot(variant: Variant, jobs: int) -> PilotTables:
     """Gains of a pilot with other settings, at every grid point."""
-    from rtsim.lpv.aircraft import load_aircraft
     from rtsim.pilot.schedule import design_schedule
     from rtsim.pilot.tables import pack_pilot
 
-    database = load_aircraft().database
+    database = load_database(variant.database or None)
     schedule = design_schedule(database, outer_loop=variant.outer_loop, settings=variant.pilot, jobs=jobs)
     return pack_pilot(database, schedule, dt=1 / RATE_HZ)
 

@@ -104,29 +104,34 @@ class FlightMeasures:
 
 
 @cache
-def _trim_map() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _trim_map(file: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Axes of the database and the two flapping angles of its trims."""
     from rtsim.aircraft.variables import STATE
-    from rtsim.lpv.aircraft import load_aircraft
+    from rtsim.lpv.files.storage import load_database
+    from rtsim.lpv.flown import flown_database
 
-    database = load_aircraft().database
+    database = flown_database(load_database(file or None), file or None)
     flapping = database.x_ref[..., [STATE.flap_1c, STATE.flap_1s]]
     return database.layer_acceleration, database.airspeed, database.nacelle, flapping
 
 
 def trimmed_flapping(
-    airspeed_kt: FloatArray, nacelle_deg: FloatArray, acceleration_kt_s: FloatArray | float = 0.0
+    airspeed_kt: FloatArray,
+    nacelle_deg: FloatArray,
+    acceleration_kt_s: FloatArray | float = 0.0,
+    database: str = "",
 ) -> FloatArray:
-    """Flapping of the trim at a condition, interpolated in the shipped database [deg].
+    """Flapping of the trim at a condition, interpolated in a database [deg].
 
     Args:
         airspeed_kt: Airspeeds [kn], any shape.
         nacelle_deg: Nacelle angles [deg], the same shape.
         acceleration_kt_s: Level accelerations [kn/s], clipped to the database's.
+        database: The database, a file; empty: the shipped XV-15.
     """
     from scipy.interpolate import RegularGridInterpolator
 
-    layers, airspeeds, nacelles, flapping = _trim_map()
+    layers, airspeeds, nacelles, flapping = _trim_map(database)
     shape = np.shape(airspeed_kt)
     points = np.stack(
         [
@@ -148,7 +153,7 @@ def flown_trim(flight: Flight, *, level: bool = False) -> FloatArray:
         level: Leave the acceleration out, as the paper's map does.
     """
     acceleration = 0.0 if level else np.gradient(flight["airspeed_reference_kt"], flight.time)
-    return trimmed_flapping(flight["airspeed_kt"], flight["nacelle_deg"], acceleration)
+    return trimmed_flapping(flight["airspeed_kt"], flight["nacelle_deg"], acceleration, flight.database)
 
 
 def measure(flight: Flight) -> FlightMeasures:

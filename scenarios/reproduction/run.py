@@ -31,19 +31,22 @@ class Reproduction:
     """All pictures."""
 
 
-def reproduce(out: Path, *, jobs: int = 1, progress: Callable[[float], None] | None = None) -> Reproduction:
+def reproduce(
+    out: Path, *, jobs: int = 1, progress: Callable[[float], None] | None = None, database: str = ""
+) -> Reproduction:
     """Regenerate the paper's figures and judge its claims.
 
     Args:
         out: Directory for the report (``report.html``), the claims (``claims.json``) and the figures; made if needed.
         jobs: Processes to use; the result does not depend on it.
         progress: Called with the work done since the last call; it adds up to :func:`total_work`.
+        database: LPV database that is flown, a file; empty: the shipped XV-15.
 
     Returns:
         What was judged and written.
 
     Raises:
-        InputError: ``out`` is a file.
+        InputError: ``out`` is a file, or the database cannot be used.
         OutputError: A file cannot be written.
     """
     advance = progress if progress is not None else lambda _: None
@@ -53,7 +56,7 @@ def reproduce(out: Path, *, jobs: int = 1, progress: Callable[[float], None] | N
         (out / "figures").mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{out}: cannot be made ({error.strerror or error}); choose another directory.") from error
-    study = run_study(jobs=jobs, progress=advance)
+    study = run_study(jobs=jobs, progress=advance, database=database)
     files = save_figures(study, FIGURES, out / "figures", drawn=advance)
     text = report_html(study, FIGURES, files, version=rtsim.__version__)
     write_and_rename(out / REPORT_NAME, lambda path: _write(path, text))

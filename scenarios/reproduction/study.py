@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from rtsim.errors import InputError
+from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import ConversionPath
 from scenarios.reproduction.claims import Claim, judge_claims
 from scenarios.reproduction.evidence import (
@@ -44,7 +46,9 @@ class Study:
     evidence: Mapping[str, Evidence]
     """What each variant shows, by its name."""
     database_hash: str
-    """Hash of the LPV database that was flown."""
+    """Hash of the aircraft that was flown."""
+    database: str = ""
+    """Its LPV database, a file; empty: the shipped XV-15."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +73,11 @@ def work_amount(variants: tuple[Variant, ...] = VARIANTS) -> int:
 
 
 def run_study(
-    *, jobs: int = 1, progress: Callable[[float], None] | None = None, variants: tuple[Variant, ...] = VARIANTS
+    *,
+    jobs: int = 1,
+    progress: Callable[[float], None] | None = None,
+    variants: tuple[Variant, ...] = VARIANTS,
+    database: str = "",
 ) -> Study:
     """Fly and judge.
 
@@ -77,7 +85,18 @@ def run_study(
         jobs: Processes to use; the result does not depend on it.
         progress: Called with the work done since the last call; it adds up to :func:`work_amount`.
         variants: Who flies; the first one is what counts. ``nonlinear`` and ``two-variable`` must be among them.
+        database: LPV database that is flown, a file; empty: the shipped XV-15.
+
+    Raises:
+        InputError: The database cannot be used, or is of another aircraft than the paper's.
     """
+    aircraft = load_database(database or None)
+    if not aircraft.profile.is_xv15:
+        raise InputError(
+            f"is of the {aircraft.profile.name}, and the paper's claims are about the XV-15",
+            file=database, mend="fly a database that borrows every part of the XV-15's profile",
+        )  # fmt: skip
+    variants = tuple(replace(variant, database=database) for variant in variants)
     advance = progress if progress is not None else _ignore
     flown: dict[str, _Flown] = {}
     for part in _all_flown(variants, jobs, advance):
@@ -89,28 +108,27 @@ def run_study(
     base = flown[variants[0].name]
     facts: dict[str, dict[str, Number]] = {
         "fig1_corridor": corridor_differences(REFERENCE_CORRIDOR),
-        "fig6_map": valley_and_ridges(),
+        "fig6_map": valley_and_ridges(database),
         "fig8_worse": {
             "nonlinear_peak_deg": flown[TRUTH].measures["fast_side_table_1_caps"].metrics.flapping_deg.peak,
         },
-        "text_12_s": twelve_seconds(),
+        "text_12_s": twelve_seconds(database),
         "text_lpv_accuracy": lpv_differences(
             base.flights["typical"], flown[PLAIN].flights["typical"], flown[TRUTH].flights["typical"]
         ),
     }
     advance(1.0)
-    facts |= grid_errors()
+    facts |= grid_errors(database)
     advance(1.0)
     evidence = {variant.name: Evidence(flown[variant.name].measures, facts) for variant in variants}
     others = {variant: evidence[variant.name] for variant in variants[1:]}
-    from rtsim.lpv.files.storage import load_database
-
     return Study(
         flights=base.flights,
-        paths=paper_paths(),
+        paths=paper_paths(database),
         claims=judge_claims(evidence[variants[0].name], others),
         evidence=evidence,
-        database_hash=load_database().content_hash,
+        database_hash=aircraft.aircraft_hash,
+        database=database,
     )
 
 
@@ -152,7 +170,7 @@ def _sort_as_asked(part: _Flown) -> None:
 def _fly_variant(variant: Variant, names: tuple[str, ...]) -> _Flown:
     """Fly and measure paths by one variant."""
     flyer = Flyer(variant)
-    paths = paper_paths()
+    paths = paper_paths(variant.database)
     measures, flights = {}, {}
     for name in names:
         flight = flyer.fly(name, paths[name])

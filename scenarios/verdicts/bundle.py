@@ -71,7 +71,9 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
 
 def _commands(case: Case, logs: dict[str, Any]) -> list[str]:
     law = shlex.quote(case.law)
-    commands = [f"rtsim test scenario.toml --protection {law} --plant {case.scenario.options.plant}"]
+    options = case.scenario.options
+    database = f" --database {shlex.quote(options.database)}" if options.database else ""
+    commands = [f"rtsim test scenario.toml --protection {law} --plant {options.plant}{database}"]
     return commands + [f"rtsim replay {item['log']}" for item in logs.values()]
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtsim.frame import COLUMN, FloatArray
+from rtsim.lpv.files.storage import load_database
 from rtsim.protection import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import LIMIT_KINDS, load_limits
@@ -93,7 +94,7 @@ def picture(case: Case) -> str:
         _draw_path(figure.add_subplot(grid[:, 0]), case, flights)
         margin = figure.add_subplot(grid[0, 1])
         _draw_margin(margin, flights)
-        _draw_shares(figure.add_subplot(grid[1, 1], sharex=margin), flights)
+        _draw_shares(figure.add_subplot(grid[1, 1], sharex=margin), case, flights)
         height = figure.add_subplot(grid[2, 1], sharex=margin)
         for _, rows, colour in flights:
             height.plot(rows[:, COLUMN.time_s], rows[:, COLUMN.altitude_m], color=colour, linewidth=1.2)
@@ -115,7 +116,7 @@ def _flights(case: Case) -> list[tuple[str, FloatArray, str]]:
 
 def _draw_path(axes: Any, case: Case, flights: Sequence[tuple[str, FloatArray, str]]) -> None:
     name = case.scenario.options.corridor_name
-    corridor = load_boundary(name)
+    corridor = load_boundary(name, load_database(case.scenario.options.database or None))
     stop = float(to_deg(corridor.downstop_nacelle))
     angles = np.linspace(corridor.downstop_nacelle, np.pi / 2.0, 181)
     low = np.concatenate([[float(corridor.low.at(0.0))], np.asarray(corridor.low.at(angles))])
@@ -161,9 +162,9 @@ def _draw_margin(axes: Any, flights: Sequence[tuple[str, FloatArray, str]]) -> N
     axes.legend(loc="best", fontsize="small")
 
 
-def _draw_shares(axes: Any, flights: Sequence[tuple[str, FloatArray, str]]) -> None:
+def _draw_shares(axes: Any, case: Case, flights: Sequence[tuple[str, FloatArray, str]]) -> None:
     """Torque, flapping and pitch as shares of their limits."""
-    limits = load_limits()
+    limits = load_limits(load_database(case.scenario.options.database or None).profile)
     for label, rows, _ in flights:
         allowed = [
             torque_limit(limits.torque, kt(row[COLUMN.airspeed_kt]), row[COLUMN.nacelle_deg] * DEGREE) / INCH_POUND

@@ -12,6 +12,7 @@ import numpy as np
 from rtsim.choices import HAND_PILOT
 from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
 from rtsim.loop.options import FlightOptions
+from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import FlightMetrics, TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
 from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
@@ -118,6 +119,7 @@ class Case:
             "error": self.error,
             "seed": self.scenario.options.seed,
             "plant": self.scenario.options.plant,
+            "database": self.scenario.options.database,
             "corridor_name": self.scenario.options.corridor_name,
             "failures": [finding.sentence for finding in self.failures],
             "expectations": [
@@ -150,9 +152,9 @@ class Tester:
             options: Options of every flight instead of each scenario's, by field of ``FlightOptions``, SI.
 
         Raises:
-            InputError: There is no such law, or an option is out of range.
+            InputError: There is no such law, an option is out of range, or the database cannot be used.
         """
-        FlightOptions().changed(options)
+        load_database(FlightOptions().changed(options).database or None)
         self._law, self._options = law, options
         self._folder = present_folder()
         self._bench = Bench()

@@ -75,6 +75,22 @@ class HomePosition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Ratings:
+    """What counts as 100 per cent, in conversion and airplane mode and in helicopter mode; the default is the XV-15."""
+
+    torque_inlb: float = 130_000.0
+    """Mast torque [in lb]."""
+    hover_torque_inlb: float = 163_000.0
+    """Mast torque in helicopter mode [in lb]."""
+    hover_nacelle_deg: float = 80.0
+    """Nacelle angle above which that holds [deg]."""
+    hover_airspeed_kt: float = 60.0
+    """Airspeed below which it holds [kn]."""
+    rotor_speed_rpm: float = 589.0
+    """Rotor speed [rpm]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MavlinkConfig:
     """Everything the MAVLink process needs to know."""
 
@@ -94,6 +110,8 @@ class MavlinkConfig:
     """System ids that may fly and change things."""
     rate_hz: float = 250.0
     """Frame rate of the flight."""
+    ratings: Ratings = Ratings()
+    """What torque and rotor speed are shares of."""
     home: HomePosition = HomePosition()
     """Start of the flight on the globe."""
     aids: Mapping[str, bool] = field(default_factory=dict)
@@ -129,6 +147,7 @@ class MavlinkConfig:
         values: dict[str, Any] = json.loads(text)
         values["targets"] = tuple(Endpoint(**target) for target in values["targets"])
         values["home"] = HomePosition(**values["home"])
+        values["ratings"] = Ratings(**values["ratings"])
         values["whitelist"] = tuple(values["whitelist"])
         return cls(**values)
 

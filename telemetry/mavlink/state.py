@@ -10,6 +10,7 @@ import numpy as np
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.units import to_deg
 from telemetry.exchange.ring import TIMING_COUNT
+from telemetry.mavlink.config import Ratings
 from telemetry.mavlink.exchange import Feedback
 
 PILOT_MOCM, PILOT_EXTERNAL, PILOT_HOLD = 0, 1, 2
@@ -18,12 +19,6 @@ INPUT_NONE, INPUT_LIVE, INPUT_LOST = 0, 1, 2
 """Values of ``Feedback.input_state``."""
 VTOL_TO_AIRPLANE, VTOL_TO_HELICOPTER, VTOL_HELICOPTER, VTOL_AIRPLANE = 1, 2, 3, 4
 """MAV_VTOL_STATE."""
-TORQUE_LIMIT_INLB = 130_000.0
-"""Mast torque of trq_pct = 100 in conversion and airplane mode [in lb]."""
-HOVER_TORQUE_LIMIT_INLB = 163_000.0
-"""The same in helicopter mode: nacelle above 80 deg and below 60 kn [in lb]."""
-ROTOR_SPEED_RPM = 589.0
-"""Rotor speed of rpm_pct = 100 [rpm]."""
 
 
 @dataclass(slots=True)
@@ -32,6 +27,8 @@ class FlightState:
 
     rate_hz: float
     """Frames per second."""
+    ratings: Ratings = field(default_factory=Ratings)
+    """What torque and rotor speed are shares of."""
     row: FloatArray = field(default_factory=lambda: np.zeros(SIGNAL_COUNT))
     """Newest frame row."""
     timing: FloatArray = field(default_factory=lambda: np.zeros(TIMING_COUNT))
@@ -118,14 +115,16 @@ class FlightState:
     @property
     def torque_pct(self) -> float:
         """Mast torque in per cent of its limit in this mode of flight."""
-        helicopter = self.value("nacelle_deg") > 80.0 and self.value("airspeed_kt") < 60.0
-        limit = HOVER_TORQUE_LIMIT_INLB if helicopter else TORQUE_LIMIT_INLB
+        full = self.ratings
+        upright = self.value("nacelle_deg") > full.hover_nacelle_deg
+        helicopter = upright and self.value("airspeed_kt") < full.hover_airspeed_kt
+        limit = full.hover_torque_inlb if helicopter else full.torque_inlb
         return 100.0 * self.value("mast_torque_inlb") / limit
 
     @property
     def rotor_speed_pct(self) -> float:
         """Rotor speed in per cent of the conversion speed."""
-        return 100.0 * self.value("rotor_speed_rpm") / ROTOR_SPEED_RPM
+        return 100.0 * self.value("rotor_speed_rpm") / self.ratings.rotor_speed_rpm
 
     @property
     def nacelle_command_deg(self) -> float:

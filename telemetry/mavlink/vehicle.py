@@ -70,7 +70,7 @@ class Vehicle:
         self.config = config
         self.now = now
         """Time of the newest call, monotonic [s]."""
-        self.state = FlightState(config.rate_hz)
+        self.state = FlightState(config.rate_hz, config.ratings)
         self.store = ParameterStore(config.aids, config.parameters)
         self.factory = MessageFactory(config, self.state)
         self.modes = offered_modes(config.aids)

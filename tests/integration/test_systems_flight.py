@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import scenarios
+from rtsim.aircraft.variables import AUXILIARY_INPUTS
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.faults import Fault
@@ -19,7 +20,6 @@ from rtsim.frame import COLUMN, FloatArray, history_sha256
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database, save_database
-from rtsim.lpv.variables import AUXILIARY_INPUTS
 from rtsim.programme import Programme
 from rtsim.realtime import FlightControl
 from rtsim.realtime.keys import press

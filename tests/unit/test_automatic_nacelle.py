@@ -12,7 +12,6 @@ from rtsim import plugins
 from rtsim.command import Command, NacelleLaw, Sensors
 from rtsim.errors import InputError
 from rtsim.nacelle.automatic import (
-    LARGEST_RATE,
     AutomaticNacelle,
     NacelleSchedule,
     ScheduledNacelle,
@@ -140,7 +139,7 @@ def test_settings_that_cannot_be_flown_are_refused():
     assert inactive_tables().active == 0
     assert AutomaticNacelle(LINE).tables().active == 1
     with pytest.raises(InputError, match="out of range"):
-        AutomaticNacelle(LINE, rate=LARGEST_RATE * 1.01)
+        AutomaticNacelle(LINE, rate=deg(12.1)).tables()
     with pytest.raises(InputError, match="must be positive"):
         AutomaticNacelle(LINE, gain=0.0)
     for speeds, angles, words in (

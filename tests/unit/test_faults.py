@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from rtsim.aircraft import INPUT, OUTPUT, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError
 from rtsim.faults import Fault, FaultEvent, fault_events
 from rtsim.faults import fault_kernels as kernels
-from rtsim.faults.fault import ENGINE_RATING
+from rtsim.faults.fault import engine_rating
 from rtsim.faults.schedule import HARD_OVER_RATE, fault_tables, new_fault_state
 from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, new_actuator_state
@@ -267,7 +268,8 @@ def test_without_the_governor_nothing_takes_the_collective_back(aircraft):
 
 
 def test_power_enough_is_no_failure(aircraft):
-    fault = Fault(kind="engine-limit", start=0.0, power=ENGINE_RATING["takeoff"], other_engine="takeoff")
+    power = engine_rating(xv15_profile(), "takeoff")
+    fault = Fault(kind="engine-limit", start=0.0, power=power, other_engine="takeoff")
     stick, lever = wave(0.05, 2.0), wave(0.02, 2.0)
     limited = Flight(aircraft, [fault], airspeed=80.0, nacelle=75.0).fly(1.0, stick, lever)
     sound = Flight(aircraft, [], airspeed=80.0, nacelle=75.0).fly(1.0, stick, lever)
@@ -341,7 +343,7 @@ def test_the_mask_names_every_failure():
         ({"kind": "actuator-hard-over", "actuator": "cyclic", "stop": "low", "rate": 0.0}, "rate: is out of range"),
         ({"kind": "airspeed-bias", "bias": math.nan}, "bias: is out of range"),
         ({"kind": "engine-limit"}, "power: is missing"),
-        ({"kind": "engine-limit", "power": 2e6}, "power: is out of range"),
+        ({"kind": "engine-limit", "power": 2e7}, "power: is out of range"),
         ({"kind": "engine-limit", "power": 0.0, "other_engine": "war"}, "other_engine: is not known"),
     ],
 )

@@ -11,14 +11,15 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # A part may import from its own layer's parts only itself, and from every part of a lower layer.
 LAYERS = (
-    ("rtsim.units",),
+    ("rtsim.units", "rtsim.places"),
     ("rtsim.errors",),
     ("rtsim.frame",),
     ("rtsim.command",),
     ("rtsim.choices",),
     ("rtsim.random_streams", "rtsim.plugins"),
     ("rtsim.kernels",),
-    ("rtsim.aircraft", "rtsim.corridor", "rtsim.programme", "rtsim.atmosphere", "telemetry"),
+    ("rtsim.aircraft", "rtsim.programme", "telemetry"),
+    ("rtsim.corridor", "rtsim.atmosphere"),
     ("rtsim.lpv",),
     ("rtsim.nacelle",),
     ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),

@@ -8,14 +8,15 @@ import math
 import numpy as np
 import pytest
 
+from rtsim.aircraft.profile import xv15_profile
 from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor import load_corridor
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
-from rtsim.protection.limits import LIMIT_KINDS, load_limits, protection_data
-from rtsim.protection.monitor import WATCHED, LimitLevels, MarginHistory, sensor_array, sensors_of_rows, severity
+from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limits
+from rtsim.protection.monitor import MarginHistory, MarginWatch, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 CALM = Sensors(
@@ -186,14 +187,13 @@ def test_watched_names_are_the_limits_and_the_time():
 
 
 def test_limits_are_the_numbers_of_the_data_in_si():
-    limits, data = load_limits(), protection_data()["limits"]
+    limits, data = load_limits(), xv15_profile().protection.data["limits"]
     assert to_deg(limits.flapping) == pytest.approx(data["flapping_deg"])
     assert to_deg(limits.nacelle_rate) == pytest.approx(data["nacelle_rate_deg_s"])
     assert to_kt(limits.plant_guard) == pytest.approx(data["plant_guard_kt"])
     assert limits.load_factor_min == data["load_factor_min"]
     assert limits.torque.takeoff == pytest.approx(data["mast_torque_takeoff_inlb"] * INCH_POUND)
     assert (limits.sink.floor, limits.sink.time) == (data["sink_rate_m_s"], data["sink_time_s"])
-    assert set(WATCHED) <= set(protection_data()["levels"])
 
 
 def test_what_is_watched_in_pieces_is_watched_as_a_whole(monitor):
@@ -203,7 +203,7 @@ def test_what_is_watched_in_pieces_is_watched_as_a_whole(monitor):
     sensors[:, SENSOR.flapping] = deg(10.0 + 3.0 * np.sin(np.arange(900) / 90.0))
     sensors[:, SENSOR.load_factor] = 1.0 + random.standard_normal(900)
     ahead = np.full(900, 6.0)
-    whole, pieces = LimitLevels(monitor.tables, 0.004), LimitLevels(monitor.tables, 0.004)
+    whole, pieces = (MarginWatch(monitor.tables, load_levels(), 0.004) for _ in range(2))
     margins, levels = whole.look(sensors, ahead)
     parts = [pieces.look(sensors[k : k + 7], ahead[k : k + 7]) for k in range(0, 900, 7)]
     assert np.array_equal(np.concatenate([part[0] for part in parts]), margins)

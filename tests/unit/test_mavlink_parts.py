@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from telemetry.exchange.child_process import child_environment
-from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, endpoints, read_signing_key
+from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, Ratings, endpoints, read_signing_key
 from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
 from telemetry.mavlink.framing import SignatureCheck, frames, signature_time
 from telemetry.mavlink.notices import FLAP_SPEEDS
@@ -213,6 +213,7 @@ def test_settings_survive_the_way_to_the_process():
         axes={"stick": "-r"},
         buttons={"pilot": 3},
         home=HomePosition(heading_deg=12.0),
+        ratings=Ratings(rotor_speed_rpm=700.0),
         whitelist=(255,),
     )
     assert MavlinkConfig.from_json(config.to_json()) == config

@@ -62,7 +62,7 @@ def test_reduced_accelerations_are_those_of_the_settled_lpv_aircraft(database, a
     names = [variable.name for variable in database.states]
     slow = [names.index(name) for name in SLOW]
     fast = [k for k in range(len(names)) if k not in slow and names[k] != "altitude"]
-    cell = reduce_model(database).cells[i, j]
+    cell = reduce_model(database, load_weights()).cells[i, j]
     trim, controls = cell[:4], cell[kernels.C_CONTROL : kernels.C_CONTROL + 2]
     step = 1e-4
     for k in range(6):

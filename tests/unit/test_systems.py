@@ -9,14 +9,12 @@ from hypothesis import strategies as st
 
 from rtsim.aircraft import INPUT, INPUTS
 from rtsim.aircraft.variables import FLAP_INPUTS
-from rtsim.aircraft.xv15.model import Xv15
 from rtsim.systems import drive_kernels as drive
 from rtsim.systems import flap_kernels as flap
 from rtsim.systems import load_drive_tables, load_flap_tables
 from rtsim.units import HORSEPOWER, deg, rpm
 
-TABLES = Xv15.load().tables
-FLAPS, DRIVE = load_flap_tables(TABLES), load_drive_tables(TABLES)
+FLAPS, DRIVE = load_flap_tables(), load_drive_tables()
 DT = 0.004
 FULL = float(DRIVE.power[-1])
 

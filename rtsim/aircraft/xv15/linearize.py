@@ -8,13 +8,22 @@ import numpy as np
 
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
 from rtsim.aircraft.table_kernels import FloatArray
-from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, OUTPUTS, STATE
+from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, OUTPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 
 # Large enough to average over table curvature, small enough for second-order accuracy (docs/model.md).
-STATE_STEPS = np.array(
-    [0.05, 0.05, 2e-3, 1e-3, 1.0, 1e-4, 1e-2, 1e-4, 1e-2, 1e-4, 1e-2, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-3]
-)
+STATE_STEPS = {
+    ("rigid", "m/s"): 0.05,
+    ("rigid", "rad/s"): 2e-3,
+    ("rigid", "rad"): 1e-3,
+    ("navigation", "m"): 1.0,
+    ("rotor", "rad"): 1e-4,
+    ("rotor", "rad/s"): 1e-2,
+    ("inflow", ""): 1e-4,
+    ("actuator", "rad"): 1e-4,
+}
+"""Steps of the states, by role and unit."""
+ELEVATOR_STEP = 1e-3
 
 if TYPE_CHECKING:
     from rtsim.aircraft.xv15.model import Xv15
@@ -69,7 +78,9 @@ def linearize_at(aircraft: Xv15, condition: Condition, trim: TrimPoint, *, step_
     """
     x, u, nacelle = trim.x, trim.u, condition.nacelle_angle
     columns = []
-    for i, size in enumerate(STATE_STEPS * step_scale):
+    for i, variable in enumerate(STATES):
+        size = ELEVATOR_STEP if variable.name == "elevator" else STATE_STEPS[variable.role, variable.unit]
+        size *= step_scale
         shift = np.zeros(x.size)
         shift[i] = size
         above, below = _evaluate(aircraft, x + shift, u, nacelle), _evaluate(aircraft, x - shift, u, nacelle)

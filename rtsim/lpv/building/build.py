@@ -14,11 +14,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import Variable
 from rtsim.errors import TrimError
 from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.building.grid import HELICOPTER_SIDE, Grid
 from rtsim.lpv.database import GRIDDED, Database, fill_invalid, quantized
-from rtsim.lpv.variables import Variable
 
 FloatArray = npt.NDArray[np.float64]
 Guess = tuple[FloatArray, FloatArray]

@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import position, required_position
 from rtsim.lpv.database import GRIDDED, Database, fill_invalid
-from rtsim.lpv.variables import position, required_position
 from rtsim.units import to_deg, to_kt
 
 FloatArray = npt.NDArray[np.float64]

@@ -35,6 +35,8 @@ NEIGHBOUR_PITCH, NEIGHBOUR_STICK, NEIGHBOUR_COLLECTIVE = 8.0 * DEGREE, 0.35, 8.0
 CORNER_AIRSPEED, CORNER_NACELLE = 0.1, 1e-3
 """Reach of the finite differences around the corners of the flap schedule [m/s, rad]."""
 
+MODEL_DATA = files(rtsim.aircraft.xv15) / "data"
+"""Folder of the nonlinear model's data."""
 MODEL_FILES = ("model_choices.toml", "xv15_inputs.toml")
 """Data of the nonlinear model, in the order in which they are hashed."""
 SAMPLE = 29
@@ -190,7 +192,7 @@ def source_sha256() -> str:
     digest = hashlib.sha256()
     for name in MODEL_FILES:
         digest.update(name.encode())
-        digest.update(repr(tomllib.loads((files(rtsim.aircraft.xv15) / "data" / name).read_text("utf-8"))).encode())
+        digest.update(repr(tomllib.loads((MODEL_DATA / name).read_text("utf-8"))).encode())
     return digest.hexdigest()
 
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError, OutputError
 from rtsim.lpv.database import GRIDDED, Database, PilotArrays
 from rtsim.lpv.files.assemble import KINDS, assemble_database
 from rtsim.lpv.validation import AXES
-from rtsim.lpv.variables import Variable
 
 _DIMENSIONS = {"x_ref": 4, "u_ref": 4, "y_ref": 4, "xdot_ref": 4, "df_dnacelle": 4, "valid": 3, "flap": 2,
                "A": 5, "B": 5, "C": 5, "D": 5}  # fmt: skip
@@ -77,6 +77,7 @@ def write_mat(database: Database, path: str | Path) -> None:
         content[f"{kind}_name"] = _cells([variable.name for variable in variables])
         content[f"{kind}_unit"] = _cells([variable.unit for variable in variables])
         content[f"{kind}_description"] = _cells([variable.description for variable in variables])
+        content[f"{kind}_role"] = _cells([variable.role for variable in variables])
     content["attributes"] = {**database.attributes, "content_hash": database.content_hash}
     if database.pilot:
         content["pilot"] = {
@@ -122,9 +123,10 @@ def _variables(content: Mapping[str, Any], kind: str, file: str) -> list[Variabl
         missing = f"{kind}_name" if names is None else f"{kind}_unit"
         raise InputError("the list is missing", file=file, key=missing, mend="add it as a cell array of texts")
     descriptions = _texts(content, f"{kind}_description") or [""] * len(names)
-    if not len(names) == len(units) == len(descriptions):
+    roles = _texts(content, f"{kind}_role") or [""] * len(names)
+    if not len(names) == len(units) == len(descriptions) == len(roles):
         raise InputError("lists of different length", file=file, key=f"{kind}_name, {kind}_unit")
-    return [Variable(*row) for row in zip(names, units, descriptions, strict=True)]
+    return [Variable(*row) for row in zip(names, units, descriptions, roles, strict=True)]
 
 
 def _record(value: Any) -> dict[str, Any]:

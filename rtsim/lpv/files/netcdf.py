@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError, OutputError
 from rtsim.lpv.database import GRIDDED, Database, PilotArrays
 from rtsim.lpv.files.assemble import KINDS, assemble_database
 from rtsim.lpv.validation import AXES
-from rtsim.lpv.variables import Variable
 
 SHIPPED: Final = Path(__file__).parents[2] / "aircraft" / "xv15" / "data" / "xv15_lpv.nc"
 """The database that comes with rtsim."""
@@ -117,6 +117,7 @@ def _write(dataset: Any, database: Database) -> None:
             (f"{kind}_name", "name"),
             (f"{kind}_unit", "unit"),
             (f"{kind}_description", "description"),
+            (f"{kind}_role", "role"),
         ):
             text = dataset.createVariable(column, str, (kind,))
             text[:] = np.array([getattr(variable, part) for variable in variables], dtype=object)
@@ -186,12 +187,12 @@ def _read_variables(dataset: Any, kind: str, file: str) -> tuple[Variable, ...]:
     for column in (f"{kind}_name", f"{kind}_unit"):
         if column not in dataset.variables:
             raise InputError("the list is missing", file=file, key=column, mend="see docs/lpv.md for the layout")
-    names = [str(text) for text in dataset.variables[f"{kind}_name"][:]]
-    units = [str(text) for text in dataset.variables[f"{kind}_unit"][:]]
-    column = f"{kind}_description"
-    described = column in dataset.variables
-    descriptions = [str(text) for text in dataset.variables[column][:]] if described else [""] * len(names)
-    return tuple(Variable(*row) for row in zip(names, units, descriptions, strict=True))
+    columns: list[list[str]] = []
+    for part in ("name", "unit", "description", "role"):
+        column = f"{kind}_{part}"
+        read = column in dataset.variables
+        columns.append([str(text) for text in dataset.variables[column][:]] if read else [""] * len(columns[0]))
+    return tuple(Variable(*row) for row in zip(*columns, strict=True))
 
 
 def _read_pilots(dataset: Any) -> dict[str, PilotArrays]:

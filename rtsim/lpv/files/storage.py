@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import functools
+import logging
+from dataclasses import replace
 from pathlib import Path
 
+from rtsim.aircraft.profile import OWN_SUFFIX, PARTS, PROFILE_ATTRIBUTE, parse_profile, read_profile, xv15_profile
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.mat import read_mat, write_mat
 from rtsim.lpv.files.netcdf import SHIPPED, read_database, write_database
@@ -14,7 +17,9 @@ def load_database(path: str | Path | None = None) -> Database:
     """Read a database; without a path, the shipped one.
 
     Args:
-        path: A NetCDF or MATLAB file (``.mat``) as written by ``save_database``; the layout is in docs/lpv.md.
+        path: A NetCDF or MATLAB file (``.mat``) as written by ``save_database``; the layout is in docs/lpv.md. Its
+            aircraft profile stands beside it (``NAME.profile.toml``) or in it; one that has none flies with the XV-15's
+            parts, which is said once.
 
     Returns:
         The database, checked, its arrays read-only.
@@ -23,24 +28,38 @@ def load_database(path: str | Path | None = None) -> Database:
         InputError: The file is missing, not readable, or not a database the kernels could fly.
     """
     file = SHIPPED if path is None else Path(path)
-    return _read_once(file, file.stat().st_mtime_ns) if file.is_file() else _read(file)
+    if not file.is_file():
+        return _read(file, None)
+    beside = file.with_name(file.stem + OWN_SUFFIX)
+    return _read_once(file, file.stat().st_mtime_ns, beside, beside.stat().st_mtime_ns if beside.is_file() else None)
 
 
-@functools.lru_cache(maxsize=2)
-def _read_once(file: Path, _modified: int) -> Database:
+@functools.lru_cache(maxsize=4)
+def _read_once(file: Path, _modified: int, beside: Path, profile_modified: int | None) -> Database:
     """Keep what was read: its arrays are read-only, and a batch of flights asks for it again and again."""
-    return _read(file)
+    return _read(file, None if profile_modified is None else beside)
 
 
-def _read(file: Path) -> Database:
-    return read_mat(file) if file.suffix.lower() == ".mat" else read_database(file)
+def _read(file: Path, beside: Path | None) -> Database:
+    database = read_mat(file) if file.suffix.lower() == ".mat" else read_database(file)
+    inside = database.attributes.get(PROFILE_ATTRIBUTE)
+    if beside is not None:
+        return replace(database, profile=read_profile(beside))
+    if inside is not None:
+        return replace(database, profile=parse_profile(str(inside), file=f"{file} ({PROFILE_ATTRIBUTE})"))
+    if file == SHIPPED:
+        return replace(database, profile=xv15_profile())
+    logging.getLogger(__name__).warning(
+        "%s: has no aircraft profile: it flies with the XV-15's %s and %s.", file, ", ".join(PARTS[:-1]), PARTS[-1]
+    )
+    return database
 
 
 def save_database(database: Database, path: str | Path) -> None:
     """Write a database to NetCDF or, for a name ending in ``.mat``, for MATLAB.
 
     The target is replaced in one move when all is written.
-    Cells without a trim are missing values in NetCDF and filled again on reading.
+    Cells without a trim are missing values in NetCDF and filled again on reading. A profile of its own goes with it.
 
     Args:
         database: What to write.
@@ -49,6 +68,8 @@ def save_database(database: Database, path: str | Path) -> None:
     Raises:
         OutputError: The file could not be written; the old one, if any, still stands.
     """
+    if database.profile.source:
+        database = replace(database, attributes={**database.attributes, PROFILE_ATTRIBUTE: database.profile.source})
     if Path(path).suffix.lower() == ".mat":
         write_mat(database, path)
         return

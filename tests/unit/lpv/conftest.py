@@ -20,7 +20,8 @@ INPUTS = ("lever", "stick", "nacelle_rate", "nacelle_acceleration", "gust_u", "g
 
 
 def _variables(names):
-    return tuple(Variable(name, "", name) for name in names)
+    roles = {"collective": "actuator", "disc": "rotor"}  # the other names are known
+    return tuple(Variable(name, "", name, roles.get(name, "")) for name in names)
 
 
 @dataclass(frozen=True)

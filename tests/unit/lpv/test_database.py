@@ -102,7 +102,7 @@ def _with_nan(array):
         (lambda _d: {"layer_acceleration": np.array([-1.0, 1.0, 2.0])}, ["no layer of level flight"]),
         (lambda d: {"valid": np.zeros_like(d.valid)}, ["valid", "no cell of the level layer"]),
         (lambda d: {"states": (*d.states[:-1], d.states[0])}, ["states", "same name twice", "collective"]),
-        (lambda d: {"states": (*d.states[:2], Variable("x", "", ""), *d.states[3:])}, ["'u' is missing"]),
+        (lambda d: {"states": (*d.states[:2], Variable("x", "", "", "rigid"), *d.states[3:])}, ["'u' is missing"]),
         (lambda _d: {"rotor_speed": float("nan")}, ["rotor_speed", "not a finite number"]),
     ],
 )

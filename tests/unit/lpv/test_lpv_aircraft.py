@@ -212,7 +212,7 @@ def test_missing_states_are_named(toy_database):
 
     from rtsim.aircraft.variables import Variable
 
-    states = tuple(Variable("rate", "", "") if v.name == "q" else v for v in toy_database.states)
+    states = tuple(Variable("rate", "", "", "rigid") if v.name == "q" else v for v in toy_database.states)
     renamed = replace(toy_database, states=states)
     with pytest.raises(InputError, match="no variable 'q', which the stitched form needs"):
         LpvAircraft(renamed)

@@ -151,14 +151,11 @@ def test_flap_corner_has_the_slope_of_the_slower_side():
 
 
 def test_source_hash_ignores_comments_and_sees_numbers(tmp_path, monkeypatch):
-    import rtsim.aircraft
-
-    (tmp_path / "data").mkdir()
-    data = tmp_path / "data" / "a.toml"
-    monkeypatch.setattr(rtsim.aircraft, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr("rtsim.lpv.building.xv15_grid.MODEL_DATA", tmp_path)
+    monkeypatch.setattr("rtsim.lpv.building.xv15_grid.MODEL_FILES", ("a.toml",))
     hashes = []
     for text in ("x = 1.0\n", "# source\nx  = 1.0\n", "x = 1.1\n", "y = 1.0\n"):
-        data.write_text(text)
+        (tmp_path / "a.toml").write_text(text)
         hashes.append(source_sha256())
     assert hashes[0] == hashes[1]
     assert len(set(hashes)) == 3
