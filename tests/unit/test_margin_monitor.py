@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +24,7 @@ from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limi
 from rtsim.protection.monitor import MarginHistory, MarginWatch, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
+ROOT = Path(__file__).resolve().parents[2]
 CALM = Sensors(
     time=0.0, airspeed=kt(105.0), airspeed_rate=0.0, nacelle_angle=deg(50.0), nacelle_rate=0.0, pitch=0.0,
     pitch_rate=0.0, flight_path_angle=0.0, altitude=100.0, climb_rate=0.0, load_factor=1.0,
@@ -214,6 +220,55 @@ def test_what_is_watched_in_pieces_is_watched_as_a_whole(monitor):
     assert found["flap_stop"]["worst_margin"] == pytest.approx(-1.0, abs=1e-3)
     assert found["flap_stop"]["outside_s"] == np.count_nonzero(margins[:, kernels.KIND.flap_stop] < 0.0) * 0.004
     assert "downstop_gate" not in found
+
+
+TOY = """
+import importlib.util, json, sys
+import numpy as np
+from rtsim.aircraft.profile import xv15_profile
+
+spec = importlib.util.spec_from_file_location("rtsim.protection.monitor_kernels", sys.argv[1])
+module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+data = xv15_profile().protection.data
+data["limits"]["climb_m_s"] = 9.0
+data["levels"]["climb"] = {"unit": "m/s", "threshold": [2.0, 1.0, 0.0], "hysteresis": 0.5}
+
+from rtsim.command import SENSOR
+from rtsim.lpv.files.storage import load_database
+from rtsim.protection.limits import LIMIT_KINDS, load_levels, load_limits
+from rtsim.protection.monitor import MarginWatch, monitor_tables
+
+watch = MarginWatch(monitor_tables("flight", load_database()), load_levels(), 0.1)
+sensors = np.zeros((4, SENSOR.size))
+sensors[:, SENSOR.climb_rate] = [1.0, 8.5, 8.5, 9.5]
+margins, levels = watch.look(sensors, np.full(4, 6.0))
+place = LIMIT_KINDS.index("climb")
+print(json.dumps([watch.summary()["climb"], levels[:, place].tolist(), load_limits().climb, place]))
+"""
+
+
+def test_a_new_limit_needs_the_kernel_and_the_data_alone(tmp_path):
+    """A toy limit has its margin, level, unit and number wherever limits are."""
+    text = (ROOT / "rtsim/protection/monitor_kernels.py").read_text(encoding="utf-8")
+    for place, line in (
+        ('    "sink": "sink rate",\n', '    "climb": "climb rate",\n'),
+        ("LIMIT_NUMBERS = {\n", '    "climb": ("climb_m_s", 0.0, 100.0),\n'),
+        (
+            "    nz = sensors[SENSOR.load_factor]\n",
+            "    out[KIND.climb] = numbers[LIMIT.climb] - sensors[SENSOR.climb_rate]\n",
+        ),
+    ):
+        assert text.count(place) == 1
+        text = text.replace(place, place + line)
+    (tmp_path / "monitor_kernels.py").write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", TOY, str(tmp_path / "monitor_kernels.py")]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, check=False)
+    assert ended.returncode == 0, ended.stderr
+    found, levels, number, place = json.loads(ended.stdout)
+    assert found == {"worst_margin": -0.5, "unit": "m/s", "outside_s": 0.1}
+    assert (levels, number, place) == ([0.0, 2.0, 2.0, 3.0], 9.0, len(LIMIT_KINDS))
 
 
 @pytest.mark.parametrize(
