@@ -19,7 +19,7 @@ from rtsim.protection.boundary import load_boundary, model_corridor
 from rtsim.protection.limits import WATCHED, LimitLevels, load_levels, load_limits
 from rtsim.protection.monitor_kernels import FAR, KIND, LIMIT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
-from rtsim.units import DEGREE, KNOT
+from rtsim.units import DEGREE
 
 SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
 """Quantities of the frame that sensors show under another name."""
@@ -243,21 +243,3 @@ def sensors_of_rows(rows: FloatArray) -> FloatArray:
     sensors[:, : len(places)] = rows[:, places] * UNIT_SCALES[places]
     sensors[:, SENSOR.nacelle_ok] = rows[:, COLUMN.failures].astype(np.int64) & NACELLES_JAMMED == 0
     return sensors
-
-
-def severity(depth: float, duration: float, *, lost: bool = False) -> str:
-    """Judge an exceedance of the corridor after the fact.
-
-    Args:
-        depth: How far outside [m/s].
-        duration: How long [s].
-        lost: Control was lost.
-
-    Returns:
-        ``none``, ``minor`` (at most 5 kn and 2 s), ``major``, or ``critical`` (more than 15 kn, or control lost).
-    """
-    if lost or depth > 15.0 * KNOT:
-        return "critical"
-    if depth <= 0.0:
-        return "none"
-    return "minor" if depth <= 5.0 * KNOT and duration <= 2.0 else "major"

@@ -21,7 +21,7 @@ from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limits
-from rtsim.protection.monitor import MarginHistory, MarginWatch, sensor_array, sensors_of_rows, severity
+from rtsim.protection.monitor import MarginHistory, MarginWatch, sensor_array, sensors_of_rows
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -269,15 +269,6 @@ def test_a_new_limit_needs_the_kernel_and_the_data_alone(tmp_path):
     found, levels, number, place = json.loads(ended.stdout)
     assert found == {"worst_margin": -0.5, "unit": "m/s", "outside_s": 0.1}
     assert (levels, number, place) == ([0.0, 2.0, 2.0, 3.0], 9.0, len(LIMIT_KINDS))
-
-
-@pytest.mark.parametrize(
-    ("depth", "duration", "lost", "word"),
-    [(-1.0, 0.0, False, "none"), (3.0, 1.0, False, "minor"), (3.0, 2.5, False, "major"), (7.0, 1.0, False, "major"),
-     (15.1, 0.2, False, "critical"), (0.0, 0.0, True, "critical")],
-)  # fmt: skip
-def test_severity(depth, duration, lost, word):
-    assert severity(kt(depth), duration, lost=lost) == word
 
 
 def history_of(margin, predicted):
