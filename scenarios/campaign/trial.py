@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 TRIAL_CORRIDOR: CorridorName = "flight"
 """Corridor of trials that name none: laws keep to it and flights are judged by it, with a law and without."""
+SLOW_CALLS = 10
+"""Calls of a law in one flight that last longer than its period and count as a failure; fewer are the machine's."""
 BUFFERED = ("reverse_margin", "pass_margin", "blend_begin", "blend_full")
 """Margins of the built-in laws that a buffer is added to."""
 
@@ -113,7 +115,7 @@ class Bench:
             rows = _fly_by_hand(simulation, pilot, self._rows[:frames])
         if chain is not None and repeat:
             chain.unrepeatable()
-        problems = () if chain is None else tuple(event.text for event in chain.events)
+        problems = () if chain is None else (*(event.text for event in chain.events), *_late(chain, law))
         yielded = bool(simulation.flying.state.script[S_YIELDED])
         numbers = measured(
             rows,
@@ -133,6 +135,15 @@ def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
         protection=law,
         corridor=plan.setup.options.corridor or TRIAL_CORRIDOR,
     )
+
+
+def _late(chain: LawChain, law: str | Sequence[LawSpec]) -> tuple[str, ...]:
+    """Laws that would be late in real time, as a sentence; it changes nothing of the flight."""
+    if chain.slow_calls < SLOW_CALLS:
+        return ()
+    names = law if isinstance(law, str) else ", ".join(spec.name for spec in law)
+    late = f"took longer than its period of {1000.0 * chain.period:.0f} ms in {chain.slow_calls} calls"
+    return (f"the law {names} {late}; in real time it would be late",)
 
 
 def _with_buffer(tables: SimulationTables, buffer: float) -> SimulationTables:
