@@ -11,8 +11,9 @@ if TYPE_CHECKING:
     from rtsim.protection.boundary import check_consistency, load_boundary
     from rtsim.protection.chain import LawChain, LawEvent, compiled_law
     from rtsim.protection.laws import BuiltInLaw, LawSpec, load_law, load_laws
-    from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, Limits, load_limits
+    from rtsim.protection.limits import LIMIT_KINDS, Limits, load_limits
     from rtsim.protection.monitor import MarginHistory, MarginMonitor, Reading
+    from rtsim.protection.monitor_kernels import LIMIT_WORDS
     from rtsim.protection.tables import LAW_NAMES, law_tables
 
 _HOME = {
@@ -26,7 +27,7 @@ _HOME = {
     "load_law": "laws",
     "load_laws": "laws",
     "LIMIT_KINDS": "limits",
-    "LIMIT_WORDS": "limits",
+    "LIMIT_WORDS": "monitor_kernels",
     "Limits": "limits",
     "load_limits": "limits",
     "MarginHistory": "monitor",

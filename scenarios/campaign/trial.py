@@ -18,12 +18,9 @@ from rtsim.loop.setup import FlightSetup, build_parts, start_trim
 from rtsim.loop.simulation import Simulation
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database
-from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
+from rtsim.measures.metrics import TrialMetrics, measured
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
-from rtsim.protection.limits import load_limits
-from rtsim.units import to_deg
-from scenarios.campaign import trial_kernels as kernels
 
 if TYPE_CHECKING:
     from rtsim.command import Pilot
@@ -119,13 +116,16 @@ class Bench:
         if chain is not None and repeat:
             chain.unrepeatable()
         problems = () if chain is None else (*(event.text for event in chain.events), *_late(chain, law))
-        metrics = np.zeros(kernels.METRIC_COUNT)
-        limits = load_limits(parts.database.profile)
-        bounds = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
-        kernels.measure_trial(rows, simulation.tables.programme, bounds, simulation.dt, metrics)
-        metrics[kernels.M_COMPLETED] = float(not simulation.finished)
-        metrics[kernels.M_YIELDED] = simulation.flying.state.script[S_YIELDED]
-        return TrialFlight(TrialMetrics(metrics), simulation.end_reason, rows.copy() if keep else rows, problems)
+        yielded = bool(simulation.flying.state.script[S_YIELDED])
+        numbers = measured(
+            rows,
+            setup.programme,
+            simulation.dt,
+            profile=parts.database.profile,
+            ended=simulation.finished,
+            yielded=yielded,
+        )
+        return TrialFlight(TrialMetrics(numbers), simulation.end_reason, rows.copy() if keep else rows, problems)
 
 
 def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:

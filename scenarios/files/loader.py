@@ -12,7 +12,6 @@ from pydantic import ValidationError
 from rtsim.errors import InputError
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
-from rtsim.measures.metrics import METRIC_NAMES
 from rtsim.plugins import closest, suggestion
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
 from rtsim.units import deg, kt
@@ -163,6 +162,8 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     found += automatic_problems(content.automatic, given(content.flight).get("nacelle", ""), file)
     found += trial_problems(content.pulses, content.trial, has_events=bool(content.events), file=file)
     for number, clause in enumerate(content.expect):
+        from rtsim.measures.metrics import METRIC_NAMES  # loads compiled code
+
         key = f"expect[{number}]"
         if clause.metric not in METRIC_NAMES:
             found.append(
