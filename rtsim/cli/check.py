@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from rtsim.cli.output import console, emit_json, results
-from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError
+from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, suggestion
+from rtsim.toml_file import read_text, read_toml
 
 if TYPE_CHECKING:
     from rtsim.lpv import Database
@@ -70,7 +70,6 @@ def file_problems(name: str) -> list[str]:
     """
     if Path(name).suffix in DATABASE_SUFFIXES:
         return _database_problems(Path(name))
-    from rtsim.plugins import suggestion
     from scenarios.files.loader import scenario_problems
 
     suffix = Path(name).suffix
@@ -102,16 +101,15 @@ def file_problems(name: str) -> list[str]:
 def _top_keys(path: Path) -> set[str]:
     """Keys of a TOML file, which tell what it is; none where it cannot be read."""
     try:
-        with path.open("rb") as file:
-            return set(tomllib.load(file))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
+        return set(read_toml(path, noun="scenario"))
+    except InputError:
         return set()  # the scenario reader tells what is wrong
 
 
 def _campaign_problems(name: str) -> list[str]:
     from scenarios.campaign.spec import parse_campaign
 
-    return [str(problem) for problem in parse_campaign(Path(name).read_text(encoding="utf-8"), file=name)[1]]
+    return [str(problem) for problem in parse_campaign(read_text(name, noun="campaign"), file=name)[1]]
 
 
 def _profile_problems(path: Path) -> list[str]:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rtsim.cli.output import console, emit_json, results, whole_file
+from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
+from rtsim.whole_file import whole_file
 
 if TYPE_CHECKING:
     from rtsim.command import Margins

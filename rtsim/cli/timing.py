@@ -136,8 +136,8 @@ def _draw(log: TimingLog, path: Path, rate: int) -> None:
     import matplotlib.pyplot as plt
     import numpy as np
 
-    from rtsim.cli.output import whole_file
     from rtsim.realtime.report import microseconds
+    from rtsim.whole_file import whole_file
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), layout="constrained", sharey=True)
     edges = np.logspace(-1, 5, 121)

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from rtsim.errors import InputError
+from rtsim.errors import InputError, suggestion
 from rtsim.loop.script import Pulse
-from rtsim.plugins import suggestion
 from rtsim.units import deg
 from scenarios.files.trial_schema import PulseTable, TrialTable
 

@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from rtsim.errors import OutputError
+from rtsim.errors import OutputError, closest
 from rtsim.frame import SIGNAL_NAMES, SIGNALS, FloatArray
 from rtsim.measures.metrics import FlightMetrics
-from rtsim.plugins import closest
 from rtsim.realtime.report import Spread, TimingReport
 from scenarios.files.scenario import Scenario
 from telemetry.log.format import LogEvent

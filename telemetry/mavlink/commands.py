@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pymavlink.dialects.v20 import all as dialect
 
-from rtsim.errors import InputError
+from rtsim.errors import InputError, OutputError
 from rtsim.units import deg
 from telemetry.mavlink import messages as ids
 from telemetry.mavlink.exchange import Request
@@ -196,7 +196,7 @@ class CommandHandler:
                 vehicle.store.load(path or "")
             else:
                 vehicle.store.defaults()
-        except (OSError, InputError) as failure:
+        except (OSError, InputError, OutputError) as failure:
             vehicle.board.say(WARNING, f"Parameters: {failure}")
             return Answer(FAILED)
         if action != 1.0:

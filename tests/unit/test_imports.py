@@ -16,7 +16,7 @@ LAYERS = (
     ("rtsim.frame",),
     ("rtsim.command",),
     ("rtsim.choices",),
-    ("rtsim.random_streams", "rtsim.plugins"),
+    ("rtsim.random_streams", "rtsim.plugins", "rtsim.toml_file", "rtsim.strict", "rtsim.whole_file"),
     ("rtsim.kernels",),
     ("rtsim.aircraft", "rtsim.programme", "telemetry"),
     ("rtsim.corridor", "rtsim.atmosphere"),
@@ -32,7 +32,16 @@ LAYERS = (
     ("rtsim.cli", "rtsim.__main__"),
 )
 LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
-TELEMETRY_MAY_IMPORT = {"rtsim.units", "rtsim.errors", "rtsim.frame", "rtsim.command", "telemetry"}
+TELEMETRY_MAY_IMPORT = {
+    "rtsim.units",
+    "rtsim.errors",
+    "rtsim.frame",
+    "rtsim.command",
+    "rtsim.toml_file",
+    "rtsim.strict",
+    "rtsim.whole_file",
+    "telemetry",
+}
 OUTPUT_PARTS = {"telemetry", "scenarios"}
 
 

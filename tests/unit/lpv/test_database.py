@@ -172,7 +172,7 @@ def test_failed_write_leaves_the_old_file(toy_database, tmp_path, suffix, monkey
 
 
 def test_unwritable_target(toy_database, tmp_path, suffix):
-    with pytest.raises(OutputError, match="could not be written"):
+    with pytest.raises(OutputError, match="cannot be written"):
         save_database(toy_database, tmp_path / "absent" / f"toy{suffix}")
 
 
