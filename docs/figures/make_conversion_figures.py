@@ -16,7 +16,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rtsim.aircraft.profile import xv15_profile
-from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.frame import FloatArray
 from rtsim.loop.setup import FlightSetup
 from rtsim.loop.simulation import Simulation

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from rtsim.analysis.frozen_loop import Condition, StabilityMap, frozen_loop, stability_map
 from rtsim.choices import OuterLoop
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.tables import prepare_tables

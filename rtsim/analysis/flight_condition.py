@@ -16,10 +16,11 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from rtsim.aircraft import Condition, TrimPoint, Variable
+    from rtsim.aircraft.points import Condition, TrimPoint
     from rtsim.aircraft.profile import AircraftProfile
+    from rtsim.aircraft.variables import Variable
     from rtsim.choices import OuterLoop
-    from rtsim.lpv import LpvAircraft
+    from rtsim.lpv.aircraft import LpvAircraft
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -68,7 +69,7 @@ _LIMITS: tuple[tuple[str, float, float, str], ...] = (
 def _stops(profile: AircraftProfile) -> tuple[tuple[str, float, float, str], ...]:
     """Stops of controls and gimbal, and what all engines give at most (docs/model.md): key, range, unit."""
     from rtsim.aircraft.controls import control_tables
-    from rtsim.protection import load_limits
+    from rtsim.protection.limits import load_limits
     from rtsim.systems.settings import all_engines_power
     from rtsim.units import HORSEPOWER, to_deg
 
@@ -167,7 +168,7 @@ def checked_outer_loop(outer_loop: str) -> OuterLoop:
 
 
 def _condition(request: Request) -> Condition:
-    from rtsim.aircraft import Condition
+    from rtsim.aircraft.points import Condition
     from rtsim.units import deg, kt, lb, rpm
 
     return Condition(
@@ -190,8 +191,8 @@ def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     Returns:
         The result by JSON key, and the trim.
     """
-    from rtsim.aircraft import INPUTS, OUTPUTS, STATES
     from rtsim.aircraft.profile import xv15_profile
+    from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES
     from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.units import to_deg, to_rpm
@@ -264,7 +265,7 @@ def solvable(request: Request) -> Request:
 
 
 def _lpv(request: Request) -> LpvAircraft:
-    from rtsim.lpv import load_aircraft
+    from rtsim.lpv.aircraft import load_aircraft
 
     return load_aircraft(request.database)
 
@@ -288,7 +289,7 @@ def _trim_result(
     configuration: tuple[float, float],
     converged: bool,
 ) -> dict[str, Any]:
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
     from rtsim.faults.fault import transmission_efficiency
     from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, to_deg
 
@@ -360,7 +361,7 @@ def nonlinear_model(request: Request) -> dict[str, Any]:
     Raises:
         TrimError: There is no trim to linearize at.
     """
-    from rtsim.aircraft import INPUTS, OUTPUTS, STATES
+    from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.lpv.building.xv15_grid import flown_model
 

@@ -12,7 +12,7 @@ from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, suggestion
 from rtsim.toml_file import read_text, read_toml
 
 if TYPE_CHECKING:
-    from rtsim.lpv import Database
+    from rtsim.lpv.database import Database
 
 DATABASE_SUFFIXES = (".nc", ".mat")
 """Files with these endings are read as LPV databases."""
@@ -146,19 +146,19 @@ def check_profile(database: Database) -> None:
     Raises:
         InputError: The first number that is missing or out of range.
     """
-    from rtsim.aids import design_aids
+    from rtsim.aids.design import design_aids
     from rtsim.aircraft.controls import control_tables
-    from rtsim.atmosphere import CALM
     from rtsim.atmosphere.air import gust_tables
+    from rtsim.atmosphere.specification import CALM
     from rtsim.choices import ChartName
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
     from rtsim.faults.schedule import fault_tables
-    from rtsim.nacelle import load_nacelle_tables
+    from rtsim.nacelle.switch import load_nacelle_tables
     from rtsim.optimization.paths import conversion_end_kt
     from rtsim.pilot.weights import pilot_settings
     from rtsim.protection.limits import load_levels
     from rtsim.protection.tables import law_tables
-    from rtsim.systems import load_drive_tables, load_flap_tables
+    from rtsim.systems.settings import load_drive_tables, load_flap_tables
 
     profile = database.profile
     for read in (control_tables, load_nacelle_tables, load_levels, load_flap_tables, load_drive_tables, pilot_settings):

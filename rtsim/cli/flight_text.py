@@ -14,7 +14,7 @@ from rtsim.cli.output import console, progress
 
 if TYPE_CHECKING:
     from rtsim.frame import FloatArray
-    from rtsim.realtime import FlightControl
+    from rtsim.realtime.control import FlightControl
     from scenarios.files.scenario import Scenario
     from scenarios.flight.result import FlightRecord, Verdict
     from telemetry.log.format import LogEvent

@@ -20,7 +20,7 @@ from rtsim.cli.output import emit_json
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
 
 if TYPE_CHECKING:
-    from rtsim.realtime import FlightControl
+    from rtsim.realtime.control import FlightControl
     from scenarios.files.scenario import Scenario
     from scenarios.flight.result import FlightRecord
     from telemetry.view.options import ViewOptions

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from rtsim.lpv import Database
+    from rtsim.lpv.database import Database
 
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 _SUFFIXES = (".nc", ".mat")
@@ -199,7 +199,7 @@ def summary(database: Database) -> dict[str, Any]:
 def _inside_corridor(database: Database) -> npt.NDArray[np.bool_]:
     import numpy as np
 
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
 
     corridor = load_corridor("design", database.profile)
     # 1e-6 m/s: a grid point on the boundary is inside whatever the rounding

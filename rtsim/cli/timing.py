@@ -59,7 +59,7 @@ def timing_command(
 def _measure(duration: float, rate: int) -> tuple[TimingReport, TimingLog]:
     """Fly the hover live, with nothing attached to it."""
     from rtsim.loop.simulation import Simulation
-    from rtsim.realtime import Executive
+    from rtsim.realtime.executive import Executive
     from scenarios.files.loader import load_scenario
     from scenarios.files.options import Overrides, with_overrides
     from scenarios.flight.flight_setup import flight_frames, flight_setup

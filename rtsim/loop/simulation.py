@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import SWITCHES, switch_of
+from rtsim.aids.design import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
-from rtsim.atmosphere import Gust, Turbulence
 from rtsim.atmosphere.air import add_gust, set_turbulence
+from rtsim.atmosphere.specification import Gust, Turbulence
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
-from rtsim.faults import Fault, FaultSwitch
+from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
@@ -243,7 +243,7 @@ class Simulation:
         """Switch a pilot aid from this frame on; no control steps.
 
         Args:
-            name: One of ``rtsim.aids.SWITCHES``.
+            name: One of ``rtsim.aids.design.SWITCHES``.
             on: On or off.
 
         Raises:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile
 from rtsim.command import Command, Sensors
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.nacelle.automatic_kernels import (

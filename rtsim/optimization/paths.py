@@ -15,7 +15,7 @@ import numpy as np
 
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.variables import required_position
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.frame import FloatArray
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions

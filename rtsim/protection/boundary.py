@@ -9,7 +9,7 @@ import numpy as np
 
 from rtsim.aircraft.variables import required_position
 from rtsim.choices import CORRIDOR_NAMES
-from rtsim.corridor import Boundary, Corridor, load_corridor
+from rtsim.corridor.boundaries import Boundary, Corridor, load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database

@@ -11,7 +11,7 @@ from rtsim.aircraft.variables import required_position
 from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import settle, settled
-from rtsim.nacelle import load_nacelle_tables
+from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.protection import prediction_kernels as kernels
 from rtsim.protection.prediction_kernels import ModelTables
 from rtsim.units import GRAVITY

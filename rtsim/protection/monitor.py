@@ -8,7 +8,7 @@ import numpy as np
 
 from rtsim.choices import CorridorName
 from rtsim.command import SENSOR, Command, Sensors
-from rtsim.corridor import LEVEL_NAMES
+from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rtsim.choices import CorridorName
-from rtsim.corridor import Corridor
+from rtsim.corridor.boundaries import Corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.protection.boundary import guarded_corridor, load_boundary

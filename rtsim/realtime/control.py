@@ -138,7 +138,7 @@ class FlightControl:
         """Switch a pilot aid; one that there is not, or that this flight needs, is refused by an event.
 
         Args:
-            name: One of ``rtsim.aids.SWITCHES``.
+            name: One of ``rtsim.aids.design.SWITCHES``.
             on: On or off; None switches it over.
         """
         self.requests.append(Request("aid", text=name, on=on))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.corridor import Corridor
+from rtsim.corridor.boundaries import Corridor
 from rtsim.frame import FloatArray
 from rtsim.units import deg
 

@@ -6,9 +6,9 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
-from rtsim.atmosphere import AirSpecification
+from rtsim.atmosphere.specification import AirSpecification
 from rtsim.choices import PilotMode
-from rtsim.faults import Fault
+from rtsim.faults.fault import Fault
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.programme import Programme, ProgrammePoint

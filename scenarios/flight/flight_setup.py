@@ -14,7 +14,7 @@ import rtsim
 from rtsim.loop.simulation import FlightSetup
 from rtsim.lpv.files.storage import load_database
 from rtsim.programme import Programme
-from rtsim.protection import load_boundary
+from rtsim.protection.boundary import load_boundary
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import automatic_nacelle
 from scenarios.files.scenario import Scenario

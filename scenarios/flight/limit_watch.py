@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.corridor import LEVEL_NAMES
+from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database

@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import rtsim
-from rtsim.aids import SWITCHES
+from rtsim.aids.design import SWITCHES
 from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.limits import load_limits
-from rtsim.sticks import StickSettings
+from rtsim.sticks.settings import StickSettings
 from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
-from telemetry.mavlink import HomePosition, MavlinkConfig
-from telemetry.mavlink.config import Ratings, endpoints
+from telemetry.mavlink.config import HomePosition, MavlinkConfig, Ratings, endpoints
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario

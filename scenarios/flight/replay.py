@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import switch_of
+from rtsim.aids.design import switch_of
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256

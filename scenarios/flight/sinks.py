@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rtsim.corridor import LEVEL_NAMES
+from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.errors import OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
 from telemetry.log.format import LogEvent
@@ -152,7 +152,7 @@ class History:
 
 
 class FlightSinks:
-    """Hands rows on; implements ``rtsim.realtime.FrameSink``."""
+    """Hands rows on; implements ``rtsim.realtime.executive.FrameSink``."""
 
     def __init__(
         self,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import FloatArray
 from rtsim.optimization.path import ConversionPath
 from rtsim.units import deg, to_kt

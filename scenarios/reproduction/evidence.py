@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import FloatArray
 from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import AccelerationCaps, path_through
@@ -187,7 +187,7 @@ def twelve_seconds(database: str = "") -> dict[str, Number]:
     Args:
         database: LPV database that the pilot knows, a file; empty: the shipped XV-15.
     """
-    from rtsim.nacelle import NacelleActuator
+    from rtsim.nacelle.switch import NacelleActuator
 
     actuator, dt, time = NacelleActuator(deg(90.0)), 0.004, 0.0
     while actuator.angle > deg(0.5) and time < 60.0:

@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from rtsim.aircraft.profile import xv15_profile
-from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.choices import OuterLoop, PlantName
 from rtsim.frame import SIGNAL_NAMES, FloatArray
 from rtsim.loop.setup import FlightSetup, build_parts

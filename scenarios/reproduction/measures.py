@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import FloatArray
 from rtsim.measures.metrics import FlightMetrics, flight_metrics
 from rtsim.optimization.paths import TABLE_1

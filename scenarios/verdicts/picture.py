@@ -11,7 +11,7 @@ import numpy as np
 
 from rtsim.frame import COLUMN, FloatArray
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection import load_boundary
+from rtsim.protection.boundary import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, load_limits
 from rtsim.units import DEGREE, INCH_POUND, kt, to_deg, to_kt

@@ -14,8 +14,10 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.errors import InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import TIMING_COUNT
-from telemetry.mavlink import Endpoint, Feedback, MavlinkConfig, MavlinkLink
+from telemetry.mavlink.config import Endpoint, MavlinkConfig
+from telemetry.mavlink.exchange import Feedback
 from telemetry.mavlink.framing import signature_time
+from telemetry.mavlink.link import MavlinkLink
 
 
 class Ground:

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from scipy import linalg, signal
 
-from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere.air import gust_tables, new_gust_state, set_turbulence
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, G_Q, gust_step
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.atmosphere.spectra import longitudinal_spectrum, pitch_spectrum, vertical_spectrum
 from rtsim.errors import InputError
 from rtsim.units import FOOT, KNOT, ft, kt

@@ -13,8 +13,8 @@ import pytest
 from rtsim import plugins
 from rtsim.command import Command, Margins, ProtectionLaw, Sensors
 from rtsim.errors import InputError
-from rtsim.protection import BuiltInLaw, compiled_law, load_law, load_laws
-from rtsim.protection.laws import LAW_PLUGIN
+from rtsim.protection.chain import compiled_law
+from rtsim.protection.laws import LAW_PLUGIN, BuiltInLaw, load_law, load_laws
 from rtsim.units import INCH_POUND, deg, kt
 
 GOOD = """

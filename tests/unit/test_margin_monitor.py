@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from rtsim.command import SENSOR, Command, Sensors
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
-from rtsim.protection.monitor import MarginHistory, sensor_array, sensors_of_rows, severity
+from rtsim.protection.monitor import MarginHistory, MarginMonitor, sensor_array, sensors_of_rows, severity
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 CALM = Sensors(

@@ -14,8 +14,8 @@ import numpy as np
 
 import rtsim
 import rtsim.aircraft.xv15
-from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Condition, LinearModel, TrimPoint, Variable
-from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
+from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
+from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES, Variable
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.lpv.building.build import GridPoint, Guess, Jacobians
