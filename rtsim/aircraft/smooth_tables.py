@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from rtsim.aircraft.table_kernels import Curves, FloatArray, Surfaces
 
@@ -24,6 +23,8 @@ def smooth_curves(arguments: Sequence[Sequence[float]], values: Sequence[Sequenc
     Returns:
         The curves; outside the break points of a curve its end values are held.
     """
+    from scipy.interpolate import PchipInterpolator
+
     rows, slopes = [], []
     for nodes, ordinates in zip(arguments, values, strict=True):
         interpolant = PchipInterpolator(np.asarray(nodes, float), np.asarray(ordinates, float))
@@ -48,6 +49,8 @@ def smooth_surface(
     Returns:
         Nodes (value, x, y and cross derivative), shape (len(x_grid), len(y_grid), 4).
     """
+    from scipy.interpolate import PchipInterpolator
+
     along_y = PchipInterpolator(np.asarray(y, float), values, axis=1)
     y_inside = np.clip(y_grid, y[0], y[-1])
     y_within = (y_grid >= y[0]) & (y_grid <= y[-1])

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 STATUS_PERIOD_S = 0.25
 """Time between two status lines [s]."""
-COLD_START_S = 3.0
-"""A start that takes longer than this is explained [s]."""
 MAX_EVENT_LINES = 40
 """Events told while flying; a flight along a boundary has more than anyone reads."""
 _CONTROLS = (("stick", "stick_s"), ("lever", "lever_s"), ("nacelles", "nacelles_s"))
@@ -70,26 +68,6 @@ class FlightScreen:
             event: What happened.
         """
         self._events.append(event)
-
-    @contextmanager
-    def cold_start_notice(self) -> Iterator[Callable[[], None]]:
-        """Explain a start that takes long, which it does while kernels are compiled for the first time.
-
-        Yields:
-            To be called when the flight starts.
-        """
-        timer = threading.Timer(
-            COLD_START_S,
-            lambda: console.print(
-                "Compiling the flight's kernels; only the first flight takes this long (up to 60 s)."
-            ),
-        )
-        timer.daemon = True
-        timer.start()
-        try:
-            yield timer.cancel
-        finally:
-            timer.cancel()
 
     @contextmanager
     def running(self) -> Iterator[None]:

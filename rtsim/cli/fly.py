@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from rtsim.choices import HAND_PILOT
+from rtsim.cli.compile_text import NOTICE
 from rtsim.cli.flight_text import FlightScreen, describe, say, summarize
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import emit_json
@@ -337,12 +338,12 @@ def _fly(
     screen = FlightScreen(scenario, control, paced=not math.isinf(speed))
     from scenarios.flight.runner import FlightOutputs, fly
 
-    with screen.cold_start_notice() as started, _stopping_signals(control) as signals, KeyReader(control) as keys:
+    with _stopping_signals(control) as signals, KeyReader(control) as keys:
         if keys.active and not math.isinf(speed):
             say(f"Keys: {KEY_HELP}")
 
         def on_start() -> None:
-            started()
+            NOTICE.flies()
             signals.arm()
             screen.first_frame_s = process_age_s()
 

@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from rtsim import __version__
+from rtsim.cli.compile_text import compile_notice
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, EXIT_TERMINATED, RtsimError, Terminated
 
 EXIT_INTERNAL_ERROR = 70
@@ -185,7 +186,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _invoke(arguments: Sequence[str] | None) -> int:
     command = typer.main.get_command(build_app())
     try:
-        result = command.main(args=arguments, prog_name="rtsim", standalone_mode=False)
+        with compile_notice():
+            result = command.main(args=arguments, prog_name="rtsim", standalone_mode=False)
     except SystemExit as end:
         # The parser turns a broken pipe into exit 1, which is our code for a failed expectation.
         if isinstance(end.__context__, BrokenPipeError):

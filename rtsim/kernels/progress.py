@@ -15,6 +15,8 @@ class Compiling(NamedTuple):
     """Name of the kernel that is compiled now."""
     done: int
     """Kernels compiled so far in this process."""
+    total: int
+    """About how many there will be; 0 where nobody knows."""
     seconds: float
     """Since the first of them was begun [s]."""
 
@@ -22,6 +24,7 @@ class Compiling(NamedTuple):
 Listener = Callable[[Compiling], None]
 _listeners: list[Listener] = []
 _done = 0
+_total = 0
 _began = 0.0
 
 
@@ -35,8 +38,18 @@ def note(what: str) -> None:
     if _done == 0:
         _began = time.monotonic()
     for listener in _listeners:
-        listener(Compiling(what, _done, time.monotonic() - _began))
+        listener(Compiling(what, _done, max(_total, _done + 1) if _total else 0, time.monotonic() - _began))
     _done += 1
+
+
+def expect(total: int) -> None:
+    """Say how many kernels there will be, should any have to be compiled.
+
+    Args:
+        total: About how many.
+    """
+    global _total  # noqa: PLW0603
+    _total = total
 
 
 @contextmanager

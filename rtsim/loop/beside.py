@@ -18,8 +18,12 @@ from typing import Any
 import numba
 import numpy as np
 
+from rtsim.kernels import progress
+
 CHILD = "RTSIM_COMPILES_BESIDE"
 """Set in the environment of the process beside."""
+KERNELS_ALONE, KERNELS_BESIDE = 107, 69
+"""Kernels that a first flight of the LPV aircraft compiles: alone, and with a process beside it."""
 _running: list[subprocess.Popen[bytes]] = []
 
 
@@ -41,7 +45,10 @@ def start(plant: str) -> None:
         plant: ``lpv`` or ``nonlinear``.
     """
     place = marker(plant)
-    if _running or place is None or place.exists() or CHILD in os.environ or (os.cpu_count() or 1) < 2:
+    if _running or (place is not None and place.exists()) or CHILD in os.environ:
+        return
+    progress.expect(KERNELS_ALONE)
+    if place is None or (os.cpu_count() or 1) < 2:
         return
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
@@ -57,6 +64,7 @@ def start(plant: str) -> None:
                 start_new_session=True,
             )
         )
+        progress.expect(KERNELS_BESIDE)
         atexit.register(_end)
 
 

@@ -110,6 +110,22 @@ class Database:
         object.__setattr__(self, "outputs", with_roles("output", self.outputs))
         check_database(self)
 
+    def freeze(self) -> None:
+        """Make every array read-only, as after loading: a copy from another process has lost that."""
+        arrays = [getattr(self, item.name) for item in fields(self)]
+        arrays += [array for pilot in self.pilot.values() for array in pilot.arrays.values()]
+        for array in arrays:
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)
+
+    def remember_hash(self, content_hash: str) -> None:
+        """Take over the content hash of a database with the same numbers.
+
+        Args:
+            content_hash: That hash.
+        """
+        object.__setattr__(self, "_hash", content_hash)
+
     @property
     def level_layer(self) -> int:
         """Number of the layer of zero acceleration."""

@@ -17,6 +17,7 @@ from rtsim.aircraft.variables import (
     required_position,
 )
 from rtsim.errors import InputError
+from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
 from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
@@ -43,7 +44,6 @@ KINEMATIC_TOLERANCE = 1e-3
 """Largest entry that may remain in the pitch and altitude rows after their kinematics are subtracted."""
 
 
-@functools.lru_cache(maxsize=8)
 def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refresh = "step") -> LpvTables:
     """Pack a database for the kernels.
 
@@ -59,6 +59,16 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
     Raises:
         InputError: The database lacks a state that the form needs, or its rows contradict the kinematics.
     """
+    return _prepared(database, form, refresh)
+
+
+@functools.lru_cache(maxsize=8)
+def _prepared(database: Database, form: Form, refresh: Refresh) -> LpvTables:
+    key = f"{database.content_hash} {form} {refresh} {scheduling_speed(database)!r}".encode()
+    return packed(kept("lpv", key, lambda: _prepare(database, form, refresh)))
+
+
+def _prepare(database: Database, form: Form, refresh: Refresh) -> LpvTables:
     number = FORMS[form]
     level = database.level_layer
     layers = slice(None) if form == "layered" else slice(level, level + 1)
@@ -97,20 +107,18 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
         ],
         axis=-1,
     )
-    return packed(
-        LpvTables(
-            airspeed=database.airspeed,
-            nacelle=database.nacelle,
-            alpha=_layers_last(scheduling_alpha(database, x_ref)),
-            valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
-            cells=_layers_last(cells),
-            output_cells=_layers_last(output_cells),
-            rows=rows,
-            state_columns=state_columns,
-            input_columns=input_columns,
-            alpha_speed=scheduling_speed(database),
-            roles=roles,
-        )
+    return LpvTables(
+        airspeed=database.airspeed,
+        nacelle=database.nacelle,
+        alpha=_layers_last(scheduling_alpha(database, x_ref)),
+        valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
+        cells=_layers_last(cells),
+        output_cells=_layers_last(output_cells),
+        rows=rows,
+        state_columns=state_columns,
+        input_columns=input_columns,
+        alpha_speed=scheduling_speed(database),
+        roles=roles,
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from rtsim.pilot.problem import FloatArray, PadeKind
 
@@ -48,6 +47,8 @@ def delay_filter(tau: FloatArray, *, order: int = 2, kind: PadeKind = "pade") ->
     Returns:
         The filters of all controls in one realization.
     """
+    from scipy.linalg import block_diag
+
     parts = [_one_filter(float(value), order, kind) for value in tau]
     rows = sum(part[0].shape[0] for part in parts)
     controls = len(parts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from rtsim.aircraft.variables import RIGID_BODY_STATES
 from rtsim.choices import OuterLoop
 from rtsim.errors import InputError
 from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
 from rtsim.lpv.database import Database
 from rtsim.pilot import layout_kernels as kernels
@@ -17,7 +19,9 @@ from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
 from rtsim.pilot.layout_kernels import PilotRoles, PilotTables, noise_width, pilot_state_size
 from rtsim.pilot.problem import FloatArray
-from rtsim.pilot.schedule import ScheduledPilot
+
+if TYPE_CHECKING:
+    from rtsim.pilot.schedule import ScheduledPilot  # which designs pilots, with scipy
 
 __all__ = ["PilotTables", "load_pilot_tables", "noise_width", "pack_pilot", "pilot_state_size"]
 
@@ -50,7 +54,13 @@ def load_pilot_tables(database: Database, outer_loop: OuterLoop = "integrators",
             allowed=", ".join(database.pilot) or "none",
             mend="design them with rtsim model import FILE --design-pilots",
         )  # fmt: skip
-    return pack_pilot(database, ScheduledPilot.from_arrays(database.pilot[outer_loop]), dt=dt)
+
+    def prepare() -> PilotTables:
+        from rtsim.pilot.schedule import ScheduledPilot
+
+        return _tables(database, ScheduledPilot.from_arrays(database.pilot[outer_loop]), dt)
+
+    return packed(kept("pilot", f"{database.content_hash} {outer_loop} {dt!r}".encode(), prepare))
 
 
 def pack_pilot(database: Database, pilot: ScheduledPilot, *, dt: float) -> PilotTables:
@@ -67,6 +77,10 @@ def pack_pilot(database: Database, pilot: ScheduledPilot, *, dt: float) -> Pilot
     Raises:
         InputError: Pilot and database do not belong together.
     """
+    return packed(_tables(database, pilot, dt))
+
+
+def _tables(database: Database, pilot: ScheduledPilot, dt: float) -> PilotTables:
     integrators = pilot.outer_loop == "integrators"
     layout = plant_layout(database, integrators=integrators)
     grid = (database.airspeed.size, database.nacelle.size)
@@ -82,27 +96,25 @@ def pack_pilot(database: Database, pilot: ScheduledPilot, *, dt: float) -> Pilot
     model = delay_filter(tau, order=order, kind="taylor" if kind == "taylor" else "pade")
     # the output is held over a frame and its inputs over another: half a frame each, so the true filter is shorter
     true = delay_filter(np.maximum(tau - dt, 0.1 * tau), order=order, kind="taylor" if kind == "taylor" else "pade")
-    return packed(
-        PilotTables(
-            airspeed=database.airspeed,
-            nacelle=database.nacelle,
-            trim=_trim_table(database, layout),
-            cells=cells,
-            a_columns=a_columns,
-            c_columns=c_columns,
-            lags=np.array([pilot.states.index(f"{n}_lag") if f"{n}_lag" in pilot.states else -1 for n in CONTROLS]),
-            model_delay_a=np.ascontiguousarray(model.A),
-            delay_b=np.ascontiguousarray(model.B),
-            model_delay_c=np.ascontiguousarray(model.C),
-            delay_d=np.ascontiguousarray(np.diag(model.D)),
-            output_delay_a=np.ascontiguousarray(true.A),
-            output_delay_c=np.ascontiguousarray(true.C),
-            limits=np.array(
-                [[-1.0, 0.0], [1.0, 1.0], [float(settings["stick_rate_limit"]), float(settings["lever_rate_limit"])]]
-            ),
-            numbers=_numbers(pilot, database, dt),
-            roles=roles,
-        )
+    return PilotTables(
+        airspeed=database.airspeed,
+        nacelle=database.nacelle,
+        trim=_trim_table(database, layout),
+        cells=cells,
+        a_columns=a_columns,
+        c_columns=c_columns,
+        lags=np.array([pilot.states.index(f"{n}_lag") if f"{n}_lag" in pilot.states else -1 for n in CONTROLS]),
+        model_delay_a=np.ascontiguousarray(model.A),
+        delay_b=np.ascontiguousarray(model.B),
+        model_delay_c=np.ascontiguousarray(model.C),
+        delay_d=np.ascontiguousarray(np.diag(model.D)),
+        output_delay_a=np.ascontiguousarray(true.A),
+        output_delay_c=np.ascontiguousarray(true.C),
+        limits=np.array(
+            [[-1.0, 0.0], [1.0, 1.0], [float(settings["stick_rate_limit"]), float(settings["lever_rate_limit"])]]
+        ),
+        numbers=_numbers(pilot, database, dt),
+        roles=roles,
     )
 
 

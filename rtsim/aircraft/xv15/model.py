@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -12,8 +13,8 @@ from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
 from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import OUTPUTS, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
-from rtsim.aircraft.xv15.data_reader import load_tables
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import packed
 
 
@@ -112,4 +113,11 @@ class Xv15:
 
 @cache
 def _cached_tables() -> AircraftTables:
-    return packed(load_tables())
+    data = sorted((Path(__file__).parent / "data").glob("*.toml"))
+    return packed(kept("xv15", b"".join(path.read_bytes() for path in data), _plain_tables))
+
+
+def _plain_tables() -> AircraftTables:
+    from rtsim.aircraft.xv15.data_reader import load_tables
+
+    return load_tables()

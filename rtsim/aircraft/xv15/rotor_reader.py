@@ -6,7 +6,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from rtsim.aircraft.smooth_tables import smooth_curves
 from rtsim.aircraft.table_kernels import FloatArray
@@ -72,6 +71,8 @@ def read_rotor(data: dict[str, Any], choices: dict[str, Any]) -> RotorTables:
     edges = np.sort(np.append(edges, own["tip_loss_factor"]))
     stations = 0.5 * (edges[1:] + edges[:-1])
     chord = np.interp(stations, rotor["chord_rR"], rotor["chord_dist_ft"]) * FOOT
+    from scipy.interpolate import PchipInterpolator
+
     twist = PchipInterpolator(twist_nodes, np.radians(rotor["twist_deg"]))
     regions = len(section["region_rR_edges"]) - 1
     weights = _region_weights(section["region_rR_edges"], stations)

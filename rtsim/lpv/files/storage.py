@@ -7,7 +7,16 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from rtsim.aircraft.profile import OWN_SUFFIX, PARTS, PROFILE_ATTRIBUTE, parse_profile, read_profile, xv15_profile
+from rtsim.aircraft.profile import (
+    OWN_SUFFIX,
+    PARTS,
+    PROFILE_ATTRIBUTE,
+    AircraftProfile,
+    parse_profile,
+    read_profile,
+    xv15_profile,
+)
+from rtsim.kernels.kept import kept
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.mat import read_mat, write_mat
 from rtsim.lpv.files.netcdf import SHIPPED, read_database, write_database
@@ -41,18 +50,41 @@ def _read_once(file: Path, _modified: int, beside: Path, profile_modified: int |
 
 
 def _read(file: Path, beside: Path | None) -> Database:
-    database = read_mat(file) if file.suffix.lower() == ".mat" else read_database(file)
+    database = _parsed(file)
     inside = database.attributes.get(PROFILE_ATTRIBUTE)
     if beside is not None:
-        return replace(database, profile=read_profile(beside))
+        return _with_profile(database, read_profile(beside))
     if inside is not None:
-        return replace(database, profile=parse_profile(str(inside), file=f"{file} ({PROFILE_ATTRIBUTE})"))
+        return _with_profile(database, parse_profile(str(inside), file=f"{file} ({PROFILE_ATTRIBUTE})"))
     if file == SHIPPED:
-        return replace(database, profile=xv15_profile())
+        return _with_profile(database, xv15_profile())
     logging.getLogger(__name__).warning(
         "%s: has no aircraft profile: it flies with the XV-15's %s and %s.", file, ", ".join(PARTS[:-1]), PARTS[-1]
     )
     return database
+
+
+def _parsed(file: Path) -> Database:
+    """What a file says, checked; kept beside the kernels, since taking it apart is a third of a warm start."""
+
+    def parse() -> Database:
+        database = read_mat(file) if file.suffix.lower() == ".mat" else read_database(file)
+        assert database.content_hash  # goes with it
+        return database
+
+    if not file.is_file():
+        return parse()
+    stat = file.stat()
+    database = kept("database", f"{file.resolve()} {stat.st_mtime_ns} {stat.st_size}".encode(), parse)
+    database.freeze()
+    return database
+
+
+def _with_profile(database: Database, profile: AircraftProfile) -> Database:
+    """The same database with another profile; its numbers are checked and hashed already."""
+    changed = replace(database, profile=profile)
+    changed.remember_hash(database.content_hash)
+    return changed
 
 
 def save_database(database: Database, path: str | Path) -> None:
