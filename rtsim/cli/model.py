@@ -80,7 +80,8 @@ def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> 
 def _with_pilots(database: Database, jobs: int, advance: Callable[[float], None]) -> Database:
     """Design the MOCM in all its forms; each tells its progress from 0 to 1."""
     from rtsim.choices import OUTER_LOOPS
-    from rtsim.lpv.database import JACOBIAN_BITS, PilotArrays, round_mantissa
+    from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
+    from rtsim.lpv.database import PilotArrays
     from rtsim.pilot.schedule import design_schedule
 
     for outer_loop in OUTER_LOOPS:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rtsim.choices import OuterLoop
-from rtsim.lpv.database import JACOBIAN_BITS, Database, PilotArrays, round_mantissa
+from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
+from rtsim.lpv.database import Database, PilotArrays
 from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
 from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem, build_problem

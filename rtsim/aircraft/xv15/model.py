@@ -96,7 +96,7 @@ class Xv15:
         """
         from rtsim.aircraft.xv15.trim import solve_trim
 
-        return solve_trim(self.at(condition), condition, guess)
+        return solve_trim(self.at(condition).tables, condition, guess)
 
     def linearize(self, condition: Condition, trim: TrimPoint, *, step_scale: float = 1.0) -> LinearModel:
         """Jacobians at a trim point by central differences.
@@ -108,7 +108,7 @@ class Xv15:
         """
         from rtsim.aircraft.xv15.linearize import linearize_at
 
-        return linearize_at(self.at(condition), condition, trim, step_scale=step_scale)
+        return linearize_at(self.at(condition).tables, condition, trim, step_scale=step_scale)
 
 
 @cache

@@ -18,7 +18,8 @@ from rtsim.aircraft.variables import Variable
 from rtsim.errors import TrimError
 from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.building.grid import HELICOPTER_SIDE, Grid
-from rtsim.lpv.database import GRIDDED, Database, fill_invalid, quantized
+from rtsim.lpv.cells import fill_invalid, quantized
+from rtsim.lpv.database import GRIDDED, Database
 
 FloatArray = npt.NDArray[np.float64]
 Guess = tuple[FloatArray, FloatArray]

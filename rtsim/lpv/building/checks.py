@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.variables import position, required_position
-from rtsim.lpv.database import GRIDDED, Database, fill_invalid
+from rtsim.lpv.cells import fill_invalid
+from rtsim.lpv.database import GRIDDED, Database
 from rtsim.units import to_deg, to_kt
 
 FloatArray = npt.NDArray[np.float64]

@@ -9,8 +9,8 @@ import numpy as np
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
-from rtsim.lpv.database import GRIDDED, Database, PilotArrays, fill_invalid
-from rtsim.lpv.validation import AXES
+from rtsim.lpv.cells import fill_invalid
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 
 OPTIONAL: Final = ("valid", "xdot_ref", "df_dnacelle", "flap", "rotor_speed")
 """Arrays that a user's own database may leave out: all cells valid, unaccelerated, and the rest zero."""

@@ -10,9 +10,8 @@ import numpy as np
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
-from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 from rtsim.lpv.files.assemble import KINDS, assemble_database
-from rtsim.lpv.validation import AXES
 from rtsim.whole_file import whole_file
 
 _DIMENSIONS = {"x_ref": 4, "u_ref": 4, "y_ref": 4, "xdot_ref": 4, "df_dnacelle": 4, "valid": 3, "flap": 2,

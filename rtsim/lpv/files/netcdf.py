@@ -15,9 +15,8 @@ import numpy.typing as npt
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
-from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 from rtsim.lpv.files.assemble import KINDS, assemble_database
-from rtsim.lpv.validation import AXES
 from rtsim.whole_file import whole_file
 
 SHIPPED: Final = Path(__file__).parents[2] / "aircraft" / "xv15" / "data" / "xv15_lpv.nc"

@@ -14,7 +14,8 @@ from scipy.io import loadmat, savemat
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError, OutputError
-from rtsim.lpv.database import GRIDDED, PilotArrays, fill_invalid, quantized, round_mantissa
+from rtsim.lpv.cells import fill_invalid, quantized, round_mantissa
+from rtsim.lpv.database import GRIDDED, PilotArrays
 from rtsim.lpv.files.storage import load_database, save_database
 
 PILOT = PilotArrays(
