@@ -17,8 +17,8 @@ from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.strict import Strict, explain
 from rtsim.toml_file import named_text, parse_toml, shipped_names
+from scenarios.campaign.events import EVENTS
 from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
-from scenarios.verdicts.events import EVENTS
 
 Generator = np.random.Generator
 Finite = Annotated[float, Field(allow_inf_nan=False)]

@@ -12,9 +12,9 @@ import numpy as np
 from rtsim.frame import FloatArray
 from rtsim.measures.trial_metrics import METRIC_PLACE
 from scenarios.campaign.chunks import LawVariant
+from scenarios.campaign.events import EVENTS
 from scenarios.campaign.spec import CampaignFile, ExpectRate
 from scenarios.campaign.statistics import Rate, bound_decided, flights_to_bound, mcnemar, quantile, rate
-from scenarios.verdicts.events import EVENTS
 
 BOOTSTRAP_SEED = 20_000
 """Added to the campaign's seed for the resampling."""

@@ -18,7 +18,7 @@ from rtsim.protection.boundary import load_boundary
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import automatic_nacelle
 from scenarios.files.scenario import Scenario
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 
 
 def flight_frames(scenario: Scenario) -> int:

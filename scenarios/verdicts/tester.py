@@ -16,11 +16,11 @@ from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import flight_metrics
 from rtsim.measures.trial_metrics import TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
+from scenarios.campaign.events import new_violations
 from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
 from scenarios.files.scenario import Expectation, Scenario
 from scenarios.files.trial import Trial
 from scenarios.flight.flight_setup import flight_setup
-from scenarios.verdicts.events import new_violations
 
 LAW_CLAUSE = "law"
 """Metric of the clause that the law runs without failing."""

@@ -14,13 +14,13 @@ from rtsim.errors import InputError, OutputError
 from rtsim.frame import FloatArray
 from rtsim.whole_file import whole_file
 from telemetry.log.reader import FlightLog
-from telemetry.view.signal_groups import label, plot_groups
+from telemetry.log.signal_groups import label, plot_groups
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from telemetry.view.corridor_outline import CorridorOutline
+    from telemetry.log.corridor_outline import CorridorOutline
 
 _Picture = tuple[str, "Callable[[FlightLog, Figure], None]", tuple[float, float]]
 

@@ -9,9 +9,9 @@ import rerun as rr
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
 from telemetry.log.format import LOG_SIGNALS
+from telemetry.log.signal_groups import label, plot_groups
 from telemetry.view.colours import SERIES
 from telemetry.view.corridor import level_of
-from telemetry.view.signal_groups import label, plot_groups
 
 MODE_NAMES = ("HELICOPTER", "CONVERSION", "AIRPLANE")
 """States of the mode strip's first line."""

@@ -23,7 +23,7 @@ from rtsim.errors import OutputError
 from rtsim.frame import FloatArray
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import Ring
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions, partial_name
 
 GIVEN_UP = 3

@@ -8,11 +8,11 @@ import rerun as rr
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT, SIGNAL_NAMES
 from telemetry.log.format import LOG_NAMES, LOG_SIGNALS
+from telemetry.log.signal_groups import FLAGS, label, plot_groups, plot_path
 from telemetry.view import airframe
 from telemetry.view import corridor as rerun_corridor
 from telemetry.view.blueprint import blueprint
 from telemetry.view.plots import ACTING_NAMES, PILOT_PLOTS, acting_on
-from telemetry.view.signal_groups import FLAGS, label, plot_groups, plot_path
 from telemetry.view.strokes import LineArt, text_width
 
 PARTS = {
