@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from rtsim.aircraft.variables import STATE
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 # Places in the switches; 1 on, 0 off.

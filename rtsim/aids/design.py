@@ -27,9 +27,9 @@ from rtsim.aids.aids_kernels import (
     AidTables,
 )
 from rtsim.aircraft.variables import FLAP_INPUTS, position
+from rtsim.arrays import FloatArray
 from rtsim.choices import AidName, SwitchName
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import settled

@@ -13,16 +13,12 @@ from rtsim.errors import InputError, TrimError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import numpy as np
-    import numpy.typing as npt
-
     from rtsim.aircraft.points import Condition, TrimPoint
     from rtsim.aircraft.profile import AircraftProfile
     from rtsim.aircraft.variables import Variable
+    from rtsim.arrays import FloatArray
     from rtsim.choices import OuterLoop
     from rtsim.lpv.aircraft import LpvAircraft
-
-    FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.variables import required_position
+from rtsim.arrays import ComplexArray, FloatArray
 from rtsim.choices import OuterLoop
 from rtsim.lpv.database import Database
 from rtsim.lpv.lpv_kernels import LpvTables, lpv_step, work_size
@@ -21,8 +22,7 @@ from rtsim.lpv.tables import Form, prepare_tables
 from rtsim.pilot import pilot_kernels as kernels
 from rtsim.pilot.design_plant import CONTROLS
 from rtsim.pilot.pilot_kernels import PilotTables
-from rtsim.pilot.problem import FloatArray
-from rtsim.pilot.response import ComplexArray, Margins, margins, one_at_a_time
+from rtsim.pilot.response import Margins, margins, one_at_a_time
 from rtsim.pilot.tables import load_pilot_tables
 
 _STEP = 1e-5

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere import gust_kernels as kernels
 from rtsim.atmosphere.gust_kernels import GustTables
 from rtsim.atmosphere.specification import SEVERITY_WIND, AirSpecification, Gust, GustShape, Severity, Turbulence
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.units import FOOT
 
 GUST_SHAPES: dict[GustShape, int] = {

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 # The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 
 
 def longitudinal_spectrum(frequency: FloatArray, *, sigma: float, scale: float, speed: float) -> FloatArray:

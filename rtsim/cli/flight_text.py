@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from rtsim.cli.output import console, progress
 
 if TYPE_CHECKING:
-    from rtsim.frame import FloatArray
+    from rtsim.arrays import FloatArray
     from rtsim.realtime.control import FlightControl
     from scenarios.files.scenario import Scenario
     from scenarios.flight.result import FlightRecord, Verdict

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.command import Margins
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.units import deg, kt
 
 if TYPE_CHECKING:

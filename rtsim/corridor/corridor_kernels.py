@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 LOW, HIGH, NACELLE_FORWARD, NACELLE_AFT = 0, 1, 2, 3

@@ -15,7 +15,7 @@ from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import STATE
 from rtsim.aircraft.xv15.dynamics_kernels import commanded_controls
 from rtsim.aircraft.xv15.tables import ControlTables
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 # Kinds, as numbers in the schedule.

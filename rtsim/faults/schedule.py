@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.faults import fault_kernels as kernels
 from rtsim.faults.fault import ACTUATORS, Fault, FaultKind, fault_changes
 from rtsim.faults.fault_kernels import FaultTables
-from rtsim.frame import FloatArray
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
 KINDS: dict[FaultKind, int] = {

@@ -10,10 +10,11 @@ import math
 
 from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import G_BUSY
 from rtsim.corridor.corridor_kernels import corridor_level_step
 from rtsim.faults.fault_kernels import F_ENGINE, F_POWER, fault_actuators_end, fault_nacelle_rate
-from rtsim.frame import COLUMN, QUANTITY, FloatArray
+from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp

@@ -8,8 +8,8 @@ begun: the loop returns and says which, the caller compiles it and goes on.
 
 from __future__ import annotations
 
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import G_BUSY
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import batch_kernel, inner_kernel, part
 from rtsim.kernels.parts import call_at
 from rtsim.loop.advance_kernels import (

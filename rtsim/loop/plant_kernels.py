@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import part
 from rtsim.lpv.lpv_kernels import W_FLAGS, LpvTables, lpv_outputs, lpv_step
 

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import KNOT
 

@@ -16,6 +16,7 @@ from rtsim.aircraft.points import Condition
 from rtsim.aircraft.variables import AUXILIARY_INPUTS, INPUTS, OUTPUTS, STATE, STATES, of_role
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import gust_tables, new_gust_state
 from rtsim.atmosphere.specification import CALM, AirSpecification
 from rtsim.choices import CorridorName, PlantName, SwitchName
@@ -24,7 +25,7 @@ from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_le
 from rtsim.errors import InputError
 from rtsim.faults.fault import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
+from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
 from rtsim.loop import beside

@@ -11,6 +11,7 @@ import numpy as np
 
 from rtsim.aids.design import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import add_gust, set_turbulence
 from rtsim.atmosphere.specification import Gust, Turbulence
 from rtsim.choices import PilotMode, SwitchName
@@ -19,7 +20,7 @@ from rtsim.errors import InputError
 from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
-from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
+from rtsim.frame import QUANTITY, SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
 from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState
 from rtsim.loop.flying import WHOLE, Flying

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from rtsim.aircraft.points import TrimPoint
 from rtsim.aircraft.variables import position, required_position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, TrimError
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import packed
@@ -25,7 +26,6 @@ from rtsim.units import to_deg, to_kt
 if TYPE_CHECKING:
     import control
 
-FloatArray = npt.NDArray[np.float64]
 
 _DERIVATIVE, _OUTPUTS = interpreted(kernels.lpv_derivative), interpreted(kernels.lpv_outputs)
 TRIM_TOLERANCE = 1e-9

@@ -9,8 +9,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.lpv.database import Database, FloatArray
+from rtsim.lpv.database import Database
 
 JACOBIAN_BITS: Final = 20
 """Bits kept of the mantissa of derivatives (6 significant digits); trims are kept in full."""

@@ -15,10 +15,8 @@ import numpy.typing as npt
 
 from rtsim.aircraft.profile import AircraftProfile, borrowed_profile
 from rtsim.aircraft.variables import SCHEDULING_STATES, Variable, position, with_roles
+from rtsim.arrays import BoolArray, FloatArray
 from rtsim.errors import InputError
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 AXES: Final = ("layer_acceleration", "airspeed", "nacelle")
 """The three axes, in the order of the arrays."""

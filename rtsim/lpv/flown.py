@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from rtsim.aircraft.variables import AUXILIARY_INPUTS, FLAP_INPUTS, INPUTS, OUTPUTS, STATES, Variable, position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.lpv.database import Database, FloatArray
+from rtsim.lpv.database import Database
 
 
 @functools.lru_cache(maxsize=4)

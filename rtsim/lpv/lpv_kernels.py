@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, part
 from rtsim.lpv.schedule_kernels import (
     FLAG_AIRSPEED_HIGH,
@@ -23,7 +24,6 @@ from rtsim.lpv.schedule_kernels import (
     REFRESH_REFERENCE,
     W_BLEND,
     W_FLAGS,
-    FloatArray,
     LpvRoles,
     LpvTables,
     auxiliary_act,

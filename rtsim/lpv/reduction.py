@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rtsim.aircraft.variables import RIGID_BODY_STATES, of_role, required_position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 
 

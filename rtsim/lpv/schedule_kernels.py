@@ -11,14 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.packed import Size
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 FORM_PLAIN = 0
 """The paper's form: linear models interpolated in airspeed and nacelle angle."""

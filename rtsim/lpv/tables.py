@@ -16,6 +16,7 @@ from rtsim.aircraft.variables import (
     position,
     required_position,
 )
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
@@ -24,7 +25,6 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.schedule_kernels import LpvRoles, LpvTables
 from rtsim.units import GRAVITY
 
-FloatArray = npt.NDArray[np.float64]
 Form = Literal["layered", "stitched", "plain"]
 Refresh = Literal["step", "references", "stage"]
 

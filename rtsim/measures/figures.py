@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.loop.data import END
 from rtsim.measures import merit_kernels as places
 from rtsim.units import HORSEPOWER

@@ -6,7 +6,8 @@ a batch and the same path flown by ``rtsim fly`` give the same numbers bit for b
 
 from __future__ import annotations
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.kernels.compiled import inner_kernel, part
 from rtsim.loop.data import Flight
 from rtsim.units import STICK_HALF_TRAVEL_IN

@@ -13,7 +13,8 @@ from typing import get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.programme import Programme
 from rtsim.units import STICK_HALF_TRAVEL_IN, to_deg
 

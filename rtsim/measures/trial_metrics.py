@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
-from rtsim.frame import FloatArray
-
-BoolArray = npt.NDArray[np.bool_]
+from rtsim.arrays import BoolArray, FloatArray
 
 TRIAL_METRICS: dict[str, str] = {
     "exceedances": "corridor exceedances: margin below -0.5 kn for 0.1 s, those within 0.5 s merged",

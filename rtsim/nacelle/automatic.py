@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile
+from rtsim.arrays import FloatArray
 from rtsim.command import Command, Sensors
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.nacelle.automatic_kernels import (
     AUTOMATIC_STATE_SIZE,
     AutomaticTables,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 

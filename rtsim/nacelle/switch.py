@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.nacelle.nacelle_kernels import (
     ANGLE,
     COMMAND_ANGLE,

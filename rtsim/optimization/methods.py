@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.random_streams import STREAM_SEARCH, stream_generator
 
 PENALTY_WEIGHT = 10.0

@@ -15,9 +15,9 @@ import numpy as np
 
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.variables import required_position
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.optimization.path import (
     TABLE_1_CAPS,

@@ -17,8 +17,8 @@ from typing import Protocol
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.optimization.methods import feasibility_order, make_method
 from rtsim.optimization.problem import CONSTRAINTS, ConversionProblem, Evaluation
 from rtsim.optimization.spec import SearchSpec

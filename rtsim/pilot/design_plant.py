@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtsim.aircraft.variables import NACELLE_INPUTS, RIGID_BODY_STATES, of_role, position, required_position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import refuse_unknown_motion, settled
 from rtsim.pilot.layout_kernels import DISPLAYS
-from rtsim.pilot.problem import FloatArray
 from rtsim.pilot.weights import PilotSettings
 
 CONTROLS = ("stick", "lever")

@@ -8,13 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
-from rtsim.pilot.layout_kernels import (
-    INTEGRALS,
-    FloatArray,
-    PilotTables,
-    pad4,
-)
+from rtsim.pilot.layout_kernels import INTEGRALS, PilotTables, pad4
 
 
 class Gains(NamedTuple):

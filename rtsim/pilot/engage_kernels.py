@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import allocating_kernel
 from rtsim.pilot.layout_kernels import (
     DISPLAY,
@@ -20,7 +21,6 @@ from rtsim.pilot.layout_kernels import (
     REF_AIRSPEED,
     S_ESTIMATE,
     S_FILTERED,
-    FloatArray,
     PilotTables,
     clip,
     commanded_trim,

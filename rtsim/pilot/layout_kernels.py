@@ -5,16 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from rtsim.aircraft.variables import RIGID_BODY_STATES
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.packed import Size
 from rtsim.places import Places
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 REF_AIRSPEED = 0
 """Position in ``reference``: filtered airspeed asked for [m/s]."""

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.pilot.dynamics_kernels import (
     Held,
@@ -52,7 +53,6 @@ from rtsim.pilot.layout_kernels import (
     S_FILTERED,
     S_LIMITED,
     SAME_CONTROL,
-    FloatArray,
     PilotTables,
     clip,
     commanded_trim,

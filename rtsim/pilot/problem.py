@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 
-FloatArray = npt.NDArray[np.float64]
 PadeKind = Literal["pade", "taylor"]
 
 REFUSAL_CODES = (

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from rtsim.aircraft.variables import required_position
+from rtsim.arrays import FloatArray
 from rtsim.choices import CORRIDOR_NAMES
 from rtsim.corridor.boundaries import Boundary, Corridor, load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import Limits, load_limits

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from rtsim.arrays import FloatArray
 from rtsim.command import SENSOR
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import *  # noqa: F403  # one place to take a law's kernels and its constants from

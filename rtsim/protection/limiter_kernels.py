@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import (

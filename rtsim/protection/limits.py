@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtsim.aircraft.variables import required_position
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import settle, settled
 from rtsim.nacelle.switch import load_nacelle_tables

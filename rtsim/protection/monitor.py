@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
 from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor.boundaries import LEVEL_NAMES
-from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES, FloatArray
+from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import CorridorTables
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.protection.law_data import (
     L_SIDE,

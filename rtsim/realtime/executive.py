@@ -18,7 +18,8 @@ from typing import Protocol
 
 import numpy as np
 
-from rtsim.frame import TIMING_SIGNALS, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import TIMING_SIGNALS
 from rtsim.realtime.clock import wait_until
 from rtsim.realtime.control import FlightControl, Request, checked_speed, neighbouring_warp
 from rtsim.realtime.policy import OverrunPolicy

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import Corridor
-from rtsim.frame import FloatArray
 from rtsim.units import deg
 
 TO_HELICOPTER, TO_AIRPLANE = 3, 4

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 DEVIATION, ENGINE_POWER, THROTTLE_OFFSET, GOVERNED, THROTTLE_TRIM = 0, 1, 2, 3, 4

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rtsim.aircraft.variables import INPUT
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 FLAP, FLAP_FOLLOWS, FLAP_SETTING = 0, 1, 2

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.systems.drive_kernels import THROTTLE_TRIM
 from rtsim.systems.flap_kernels import FLAP_SETTING, FlapTables, flap_now
 from rtsim.units import deg, to_deg

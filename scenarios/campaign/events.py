@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rtsim.frame import FloatArray
-from rtsim.measures.trial_metrics import METRIC_PLACE, SECONDARY_LIMITS, BoolArray, TrialMetrics, violations
+from rtsim.arrays import BoolArray, FloatArray
+from rtsim.measures.trial_metrics import METRIC_PLACE, SECONDARY_LIMITS, TrialMetrics, violations
 
 DEEP_KT = 5.0
 """Depth beyond which an exceedance is major [kn]."""

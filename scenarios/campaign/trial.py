@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import BUILT_IN_PILOT, CorridorName, PlantName
 from rtsim.errors import InputError
-from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.frame import SIGNAL_COUNT, history_sha256
 from rtsim.loop.data import SimulationTables
 from rtsim.loop.script_kernels import S_YIELDED
 from rtsim.loop.setup import FlightSetup, build_parts, start_trim

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import law_data as law
 from rtsim.protection.limiter_kernels import torque_limit

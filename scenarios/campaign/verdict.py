@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.measures.trial_metrics import METRIC_PLACE
 from scenarios.campaign.chunks import LawVariant
 from scenarios.campaign.events import EVENTS

@@ -7,9 +7,10 @@ from typing import Any, Protocol, get_args
 
 from rtsim.aids.aids_kernels import MAP_STICK, scheduled
 from rtsim.aids.design import SWITCHES
+from rtsim.arrays import FloatArray
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN
 from rtsim.loop.simulation import Simulation
 from rtsim.protection.boundary import load_boundary
 from rtsim.realtime.control import FlightControl

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import LEVEL_NAMES
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, WATCHED, load_levels

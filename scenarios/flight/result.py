@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError, closest
-from rtsim.frame import SIGNAL_NAMES, SIGNALS, FloatArray
+from rtsim.frame import SIGNAL_NAMES, SIGNALS
 from rtsim.measures.metrics import FlightMetrics
 from rtsim.realtime.report import Spread, TimingReport
 from scenarios.files.scenario import Scenario

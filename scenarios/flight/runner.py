@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from rtsim.frame import FloatArray, history_sha256
+from rtsim.frame import history_sha256
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.metrics import flight_metrics
 from rtsim.realtime.control import FlightControl, checked_speed

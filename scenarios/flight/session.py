@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from rtsim.aids.design import switch_of
+from rtsim.arrays import FloatArray
 from rtsim.choices import PilotMode
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults.fault import fault_events
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT
 from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.protection.chain import LawEvent

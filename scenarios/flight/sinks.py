@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.errors import OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS
 from telemetry.log.format import LogEvent
 
 if TYPE_CHECKING:

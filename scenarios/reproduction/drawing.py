@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
-from rtsim.frame import FloatArray
 from rtsim.optimization.path import ConversionPath
 from rtsim.units import deg, to_kt
 from rtsim.whole_file import whole_file

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
-from rtsim.frame import FloatArray
 from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import AccelerationCaps, path_through
 from rtsim.optimization.paths import centre_line_corners, trim_flapping_map

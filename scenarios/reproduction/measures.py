@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
-from rtsim.frame import FloatArray
 from rtsim.measures.metrics import FlightMetrics, flight_metrics
 from rtsim.optimization.paths import TABLE_1
 from rtsim.units import deg, kt, to_kt

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit

@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import HAND_PILOT
-from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.frame import SIGNAL_COUNT, history_sha256
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import flight_metrics

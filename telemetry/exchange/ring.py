@@ -16,8 +16,9 @@ from multiprocessing.shared_memory import SharedMemory
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
+from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS
 
 TIMING_COUNT = len(TIMING_SIGNALS)
 """Number of wall-clock columns that follow the signals in a full row."""

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import FloatArray
 from rtsim.whole_file import whole_file
 from telemetry.log.reader import FlightLog
 from telemetry.log.signal_groups import label, plot_groups

@@ -23,8 +23,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.log.format import EVENTS_FILE, FlightMetadata, LogEvent

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.command import StickInput
 from rtsim.errors import OutputError
-from rtsim.frame import FloatArray
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key

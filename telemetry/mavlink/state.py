@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.units import to_deg
 from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.mavlink.config import Ratings

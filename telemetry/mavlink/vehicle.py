@@ -12,8 +12,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from telemetry.mavlink import messages as ids
 from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler, command_values
 from telemetry.mavlink.config import MavlinkConfig

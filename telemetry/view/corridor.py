@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.colours import CYAN, DIM, FRAME, GRID, HIGH_SIDE, LEVELS, LOW_SIDE, TEXT, TRAIL, WHITE
 from telemetry.view.strokes import LineArt

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from telemetry.view.colours import (
     ACTING,
     AMBER,

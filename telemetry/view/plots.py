@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.log.format import LOG_SIGNALS
 from telemetry.log.signal_groups import label, plot_groups
 from telemetry.view.colours import SERIES

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from telemetry.view import airframe
 from telemetry.view.colours import CYAN, LEFT_ROTOR, RIGHT_ROTOR, TRAIL
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.blueprint import blueprint
 from telemetry.view.corridor import CorridorPlot

@@ -19,8 +19,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from rtsim.frame import FloatArray
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import Ring
 from telemetry.log.corridor_outline import CorridorOutline

@@ -11,10 +11,11 @@ from rtsim.aids.aids_kernels import MAP_STICK_FLAPS
 from rtsim.aids.design import SWITCHES
 from rtsim.aircraft.variables import STATE
 from rtsim.analysis.handling import handling
+from rtsim.arrays import FloatArray
 from rtsim.command import Command, Sensors
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.programme import Programme

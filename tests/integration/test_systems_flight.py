@@ -13,10 +13,11 @@ import pytest
 
 import scenarios
 from rtsim.aircraft.variables import AUXILIARY_INPUTS
+from rtsim.arrays import FloatArray
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.faults.fault import Fault
-from rtsim.frame import COLUMN, FloatArray, history_sha256
+from rtsim.frame import COLUMN, history_sha256
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database, save_database

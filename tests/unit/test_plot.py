@@ -11,8 +11,9 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.log import flight_plots
 from telemetry.log.corridor_outline import CorridorOutline

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.measures.metrics import METRIC_NAMES, exceedance_events, flight_metrics, metric_unit, nacelle_reference_deg
 from rtsim.programme import Programme
 from rtsim.units import deg

@@ -14,7 +14,7 @@ import numpy as np
 from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.profile import XV15_DATA
 from rtsim.aircraft.smooth_tables import smooth_curves, smooth_surface, stack_surfaces
-from rtsim.aircraft.table_kernels import Curves, FloatArray
+from rtsim.aircraft.table_kernels import Curves
 from rtsim.aircraft.xv15.rotor_reader import read_rotor
 from rtsim.aircraft.xv15.tables import (
     AircraftTables,
@@ -25,6 +25,7 @@ from rtsim.aircraft.xv15.tables import (
     TailTables,
     WingTables,
 )
+from rtsim.arrays import FloatArray
 from rtsim.toml_file import shipped_toml
 from rtsim.units import FOOT, INCH, KNOT, POUND, SLUG, SLUG_FOOT_SQUARED, deg, rpm
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
 from rtsim.aircraft.xv15.airframe_kernels import body_load, moment_arm, wing_angle_of_attack, wing_load
 from rtsim.aircraft.xv15.rotor_kernels import (
@@ -19,6 +19,7 @@ from rtsim.aircraft.xv15.rotor_kernels import (
 )
 from rtsim.aircraft.xv15.tables import AircraftTables, Configuration, ControlTables, MassTables
 from rtsim.aircraft.xv15.tail_kernels import tail_load
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import GRAVITY
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, OUTPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 
 # Large enough to average over table curvature, small enough for second-order accuracy (docs/model.md).
 STATE_STEPS = {

@@ -10,10 +10,10 @@ import numpy as np
 
 from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import OUTPUTS, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import packed
 

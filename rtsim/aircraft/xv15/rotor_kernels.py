@@ -19,8 +19,9 @@ import math
 
 import numpy as np
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.xv15.tables import Configuration, RotorTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 
 # Entries of the load vector written by rotor_loads.

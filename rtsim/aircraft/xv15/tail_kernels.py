@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aircraft.table_kernels import FloatArray, curve, surface
+from rtsim.aircraft.table_kernels import curve, surface
 from rtsim.aircraft.xv15.airframe_kernels import fold, wind_to_body
 from rtsim.aircraft.xv15.tables import Configuration, TailTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 

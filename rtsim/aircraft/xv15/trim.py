@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from rtsim.aircraft.points import Condition, TrimPoint
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
@@ -25,6 +24,7 @@ from rtsim.aircraft.xv15.trim_kernels import (
     trim_residual,
     trim_vectors,
 )
+from rtsim.arrays import FloatArray
 from rtsim.units import GRAVITY, KNOT
 
 CONVERGED = 1e-9

@@ -11,10 +11,11 @@ import math
 
 import numpy as np
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import INPUT, INPUTS, STATE, STATES
 from rtsim.aircraft.xv15.dynamics_kernels import WORK_COUNT, derivative
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import kernel
 
 UNKNOWNS = 9

@@ -12,16 +12,15 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from rtsim.aircraft.variables import Variable
+from rtsim.arrays import FloatArray
 from rtsim.errors import TrimError
 from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.building.grid import HELICOPTER_SIDE, Grid
 from rtsim.lpv.cells import fill_invalid, quantized
 from rtsim.lpv.database import GRIDDED, Database
 
-FloatArray = npt.NDArray[np.float64]
 Guess = tuple[FloatArray, FloatArray]
 Jacobians = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 

@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from rtsim.aircraft.variables import position, required_position
+from rtsim.arrays import BoolArray, FloatArray
 from rtsim.lpv.cells import fill_invalid
 from rtsim.lpv.database import GRIDDED, Database
 from rtsim.units import to_deg, to_kt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Axis = Literal["airspeed", "nacelle"]
 
 NEIGHBOUR_LIMIT = 1e-2
