@@ -43,7 +43,6 @@ class InputError(RtsimError):
 
         Args:
             problem: What is wrong, in a few words without full stop.
-            file: The file it stands in, where there is one.
             key: The key, option or argument, spelled as the user spells it.
             value: The offending value (shown with ``repr``); None leaves it out.
             allowed: The allowed range or choices, in words.

@@ -27,7 +27,6 @@ def checked(model: type[Table], data: Any, *, file: str | None) -> Table:
     Args:
         model: What the table may hold.
         data: What it holds.
-        file: The file it stands in, for the message.
 
     Raises:
         InputError: For the first mistake found.
@@ -44,7 +43,6 @@ def explain(error: ValidationError, model: type[BaseModel], file: str | None) ->
     Args:
         error: What validation raised.
         model: The model that was validated.
-        file: The file, as shown to the user.
 
     Returns:
         One :class:`InputError` per problem, in the order of the file's keys.

@@ -101,7 +101,6 @@ def parse_toml(text: str, *, file: str) -> dict[str, Any]:
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the message.
 
     Raises:
         InputError: It is not valid TOML.

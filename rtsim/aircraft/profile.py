@@ -3,6 +3,9 @@
 A profile is a TOML document. The XV-15's names one file for each part; a profile of one's own stands beside its
 database (``NAME.profile.toml``) or inside it (attribute ``aircraft_profile``), holds the parts as tables of the same
 layout, and says with ``borrows`` which it takes from the XV-15. Each subsystem reads its own part, and checks it there.
+
+Legend:
+    key: Its name.
 """
 
 from __future__ import annotations
@@ -46,9 +49,6 @@ class Part:
     def table(self, key: str) -> Part:
         """A table within this one.
 
-        Args:
-            key: Its name.
-
         Raises:
             InputError: There is none.
         """
@@ -58,18 +58,13 @@ class Part:
         return Part(f"{self.name}.{key}", self.file, value)
 
     def has(self, key: str) -> bool:
-        """Whether there is a value.
-
-        Args:
-            key: Its name.
-        """
+        """Whether there is a value."""
         return key in self.data
 
     def number(self, key: str, *, low: float = -math.inf, high: float = math.inf) -> float:
         """A number within a range.
 
         Args:
-            key: Its name.
             low: Smallest value allowed.
             high: Largest value allowed.
 
@@ -84,7 +79,6 @@ class Part:
         """A list of numbers within a range.
 
         Args:
-            key: Its name.
             low: Smallest value allowed.
             high: Largest value allowed.
             count: How many there must be; None: any number but none.
@@ -104,9 +98,6 @@ class Part:
 
     def text(self, key: str) -> str:
         """A text.
-
-        Args:
-            key: Its name.
 
         Raises:
             InputError: It is missing or no text.
@@ -217,7 +208,6 @@ def parse_profile(text: str, *, file: str) -> AircraftProfile:
 
     Args:
         text: The TOML document.
-        file: Where it came from, for messages.
 
     Raises:
         InputError: It is not valid TOML, or a part is neither there nor borrowed.

@@ -1,4 +1,8 @@
-"""What ``rtsim trim`` and ``rtsim linearize`` answer: a flight condition solved from the database or afresh."""
+"""What ``rtsim trim`` and ``rtsim linearize`` answer: a flight condition solved from the database or afresh.
+
+Legend:
+    request: What was asked for.
+"""
 
 from __future__ import annotations
 
@@ -114,9 +118,6 @@ def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
 def checked(request: Request) -> Request:
     """Refuse values out of range.
 
-    Args:
-        request: What was asked for.
-
     Returns:
         The same request.
 
@@ -181,9 +182,6 @@ def _condition(request: Request) -> Condition:
 def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     """Trim the nonlinear model at the condition.
 
-    Args:
-        request: What was asked for.
-
     Returns:
         The result by JSON key, and the trim.
     """
@@ -209,9 +207,6 @@ def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
 def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     """Trim the LPV aircraft.
 
-    Args:
-        request: What was asked for.
-
     Returns:
         The result by JSON key, and the trim.
 
@@ -232,9 +227,6 @@ def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
 
 def solvable(request: Request) -> Request:
     """Ask the nonlinear model where the shipped database has no answer: beside its edge there may be a trim.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The request, or the same for the nonlinear model.
@@ -331,7 +323,6 @@ def no_trim(request: Request, point: TrimPoint) -> TrimError:
     """Say that there is no trim, and what did not close.
 
     Args:
-        request: What was asked for.
         point: Where the search ended.
 
     Returns:
@@ -347,9 +338,6 @@ def no_trim(request: Request, point: TrimPoint) -> TrimError:
 
 def nonlinear_model(request: Request) -> dict[str, Any]:
     """Linearize the nonlinear model at the condition.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The model by JSON key.
@@ -372,9 +360,6 @@ def nonlinear_model(request: Request) -> dict[str, Any]:
 def database_model(request: Request) -> dict[str, Any]:
     """Take the linear model from the database.
 
-    Args:
-        request: What was asked for.
-
     Returns:
         The model by JSON key.
 
@@ -396,7 +381,6 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
     """Linearize the loop of aircraft and pilot, frozen at the condition and sampled as flown.
 
     Args:
-        request: What was asked for.
         outer_loop: ``integrators`` or ``pi``.
 
     Returns:

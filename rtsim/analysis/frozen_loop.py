@@ -175,10 +175,8 @@ def frozen_loop(
     """Linearize aircraft and pilot as flown, frozen at one command.
 
     Args:
-        database: Trims, linear models and pilot gains.
         condition: The command.
         outer_loop: How airspeed and altitude are held.
-        dt: Length of a frame [s].
         form: Form of the LPV aircraft.
         tables: Prepared tables of aircraft and pilot, to save time on maps; None: prepared from the database.
 
@@ -241,11 +239,9 @@ def stability_map(
     """Map the frozen loop's growth over all valid grid points or the middles of all valid cells.
 
     Args:
-        database: Trims, linear models and pilot gains.
         outer_loop: How airspeed and altitude are held.
         mid_cells: Middles of cells instead of grid points.
         layer: Layer of the trims; None: level flight.
-        dt: Length of a frame [s].
         tables: Prepared tables; None: prepared from the database.
 
     Returns:

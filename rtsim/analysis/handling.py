@@ -52,8 +52,6 @@ def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tu
 
     Args:
         aircraft: The LPV aircraft.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
         aids: The aids that are on.
     """
     trim = aircraft.trim(airspeed=airspeed, nacelle=nacelle)

@@ -78,11 +78,7 @@ def new_gust_state(air: AirSpecification, normals: FloatArray | None = None) -> 
 
 
 def normals_needed(state: FloatArray) -> int:
-    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3.
-
-    Args:
-        state: Gust state.
-    """
+    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3."""
     return kernels.NORMALS_PER_FRAME if state[dryden.T_ACTIVE] != 0.0 else 0
 
 

@@ -99,10 +99,8 @@ def gust_step(
     """Move the gusts on to a time and give what acts during the frame that starts there.
 
     Args:
-        tables: Parameters.
         state: Gust state, updated in place.
         airspeed: Speed through the undisturbed air [m/s].
-        altitude: Height above the ground [m].
         pitch: Pitch attitude [rad].
         time: Time at the start of the frame [s].
         dt: Length of the frame that ends at ``time``; 0 at the start of the flight [s].

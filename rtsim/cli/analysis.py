@@ -37,11 +37,7 @@ _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the commands to the app."""
     app.command("trim")(trim_command)
     app.command("linearize")(linearize_command)
 

@@ -21,11 +21,7 @@ PROFILE_SUFFIX = ".profile.toml"
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("check")(check_command)
 
 
@@ -139,9 +135,6 @@ def _stick_map_problems(name: str) -> list[str]:
 
 def check_profile(database: Database) -> None:
     """Read every part of an aircraft's profile, as its flights do.
-
-    Args:
-        database: The aircraft.
 
     Raises:
         InputError: The first number that is missing or out of range.

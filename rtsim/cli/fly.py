@@ -36,11 +36,7 @@ Severity = Literal["none", "light", "moderate", "severe"]
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("fly")(fly_command)
 
 

@@ -26,11 +26,7 @@ _BUILD_SHARE, _PILOT_SHARE = 0.2, 0.4  # of the work: the trims and models, and 
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command group to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command group to the app."""
     group = typer.Typer(no_args_is_help=True, help="The LPV database: trim map, linear models and pilot gains.")
     group.callback()(_group)
     group.command("build")(build_command)
@@ -158,9 +154,6 @@ def import_command(
 
 def summary(database: Database) -> dict[str, Any]:
     """Describe a database in numbers.
-
-    Args:
-        database: The database.
 
     Returns:
         What ``rtsim model info --json`` prints, without the file name.

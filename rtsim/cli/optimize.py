@@ -24,11 +24,7 @@ _OWN = "the specification's"
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("optimize")(optimize_command)
 
 

@@ -23,11 +23,7 @@ DRIFT_GOAL_FRAMES = 1.0
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("timing")(timing_command)
 
 

@@ -52,11 +52,7 @@ class NacelleSchedule:
             raise InputError("its nacelle angles must not rise with the airspeed", key="nacelle schedule", value=angles)
 
     def at(self, airspeed: float) -> float:
-        """Nacelle angle at an airspeed [rad]; constant beyond the ends.
-
-        Args:
-            airspeed: Airspeed [m/s].
-        """
+        """Nacelle angle at an airspeed [rad]; constant beyond the ends."""
         return float(np.interp(airspeed, self.airspeed, self.nacelle))
 
 
@@ -68,7 +64,6 @@ def centre_line_schedule(
     Args:
         corridor: Name of the corridor.
         step_deg: Distance of the corners in nacelle angle [deg].
-        profile: The aircraft; None: the XV-15.
     """
     centre = load_corridor(corridor, profile).centre_speed
     corners: list[tuple[float, float]] = []
@@ -185,9 +180,7 @@ class ScheduledNacelle:
         """Give this frame's nacelle rate [rad/s].
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command of this frame; not used.
-            dt: Length of the frame [s].
         """
         if self._command_angle is None or not sensors.nacelle_ok:
             self._command_angle = sensors.nacelle_angle

@@ -170,7 +170,6 @@ def checked_spec(
     Args:
         data: The tables.
         changes: Values that override them, by key: ``points``, ``search.seed``.
-        file: Where the tables came from, for messages.
 
     Raises:
         InputError: A key or value is not allowed; the first one found.

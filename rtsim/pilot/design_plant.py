@@ -78,7 +78,6 @@ def plant_layout(database: Database, *, integrators: bool) -> PlantLayout:
     """Find the rigid body and the actuators of each hand among the database's states.
 
     Args:
-        database: The linear models.
         integrators: Append the integrals of airspeed and altitude error.
 
     Returns:
@@ -138,7 +137,6 @@ def design_plant(
     """Build the design plant of one grid point.
 
     Args:
-        database: The linear models.
         layout: Its layout.
         where: Numbers of layer, airspeed and nacelle angle.
         settings: Gusts to reckon with.

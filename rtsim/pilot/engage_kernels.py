@@ -50,10 +50,7 @@ def mocm_engage(
     controls are also what the pilot wants, as far as their limits allow.
 
     Args:
-        tables: Prepared pilot.
         state: The pilot's state, overwritten.
-        x: Aircraft state.
-        nacelle_angle: Nacelle angle [rad].
         nacelle_rate: Nacelle rate [rad/s] (unused: its effect is known from the first frame on).
         reference: What is asked for, see the module.
         present: Stick and lever that act now.

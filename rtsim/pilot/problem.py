@@ -61,7 +61,6 @@ class MocmError(InputError):
         Args:
             code: The reason, one of ``REFUSAL_CODES``.
             problem: What is wrong, in a few words without full stop.
-            file: The file it stands in, where there is one.
             key: The field at fault.
             value: The offending value.
             allowed: The allowed range or choices, in words.

@@ -173,7 +173,6 @@ def design_schedule(
     """Design the pilot at every valid point of the database's level layer.
 
     Args:
-        database: Trims and linear models.
         outer_loop: How airspeed and altitude are held.
         settings: Weights and noises; None: the aircraft's.
         jobs: Processes to use; the result does not depend on it.

@@ -93,7 +93,6 @@ class BuiltInLaw:
         """Give the limited command and the interventions of this frame.
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command of this frame.
             margins: Not used: the law has its own boundaries.
             dt: Time since the last call [s].

@@ -45,7 +45,6 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
     Rotor and actuator states settle within 0.2 s and are replaced by their settled values.
 
     Args:
-        database: Trims and linear models.
         weights: Weights of the recovery's regulator.
 
     Returns:

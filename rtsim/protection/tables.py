@@ -36,8 +36,6 @@ def law_tables(
 
     Args:
         law: ``off``, ``monitor``, ``governor`` or ``full``.
-        database: The aircraft the law knows.
-        dt: Length of a frame [s].
         boundary: The corridor it keeps to; its low side is tightened to what the plant can trim.
         settings: The law's numbers; None: the aircraft's.
 

@@ -48,7 +48,6 @@ class FrameSink(Protocol):
 
         Args:
             row: The frame, shape (SIGNAL_COUNT,); copy what is kept.
-            timing: Timing columns of the frame before, shape (TIMING_SIGNALS,).
         """
         ...
 
@@ -62,11 +61,7 @@ class FrameSink(Protocol):
         ...
 
     def block(self, rows: FloatArray) -> None:
-        """Show and keep rows of a flight that is not paced; may wait, so that nothing is lost.
-
-        Args:
-            rows: The frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Show and keep rows of a flight that is not paced; may wait, so that nothing is lost."""
         ...
 
 

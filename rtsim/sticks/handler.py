@@ -175,7 +175,6 @@ class StickHandler:
             sticks: The newest stick input.
             age: Time since it arrived [s].
             situation: The aircraft.
-            dt: Length of the frame [s].
         """
         settings = self.settings
         fresh = sticks.sequence > 0 and age <= settings.loss_time

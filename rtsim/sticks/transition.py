@@ -43,7 +43,6 @@ class TransitionSchedule:
 
         Args:
             direction: ``TO_HELICOPTER`` or ``TO_AIRPLANE``.
-            airspeed: Airspeed [m/s].
         """
         if direction == TO_AIRPLANE:
             return float(np.interp(airspeed, self.forward_airspeed, self.forward_angle))

@@ -228,7 +228,6 @@ def parse_campaign(text: str, *, file: str) -> tuple[CampaignFile | None, list[I
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the messages.
 
     Returns:
         The campaign and no problems, or None and at least one.

@@ -158,8 +158,6 @@ def has_trim(plant: PlantName, airspeed: float, nacelle: float, *, database: str
 
     Args:
         plant: Aircraft model.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
         database: LPV database of the aircraft, a file; empty: the shipped XV-15.
     """
     aircraft = flown_database(load_database(database or None), database or None)

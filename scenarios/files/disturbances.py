@@ -28,7 +28,6 @@ def disturbance_problems(air: AirTable, faults: Sequence[FaultTable], file: str)
     Args:
         air: The table of the air.
         faults: The failures.
-        file: The file, for the messages.
     """
     found = []
     if air.turbulence is not None and air.wind_at_20_ft_kt is not None:

@@ -67,7 +67,6 @@ def parse_scenario(text: str, *, file: str) -> tuple[Scenario | None, list[Input
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the messages.
 
     Returns:
         The scenario and no problems, or None and at least one.
@@ -92,7 +91,6 @@ def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> Progra
 
     Args:
         condition: ``hover``, ``conversion`` or ``cruise``.
-        altitude: Altitude [m].
     """
     if condition not in START_CONDITIONS:
         raise InputError(

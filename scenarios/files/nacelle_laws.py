@@ -89,7 +89,6 @@ def automatic_problems(table: AutomaticTable | None, nacelle: str, file: str) ->
     Args:
         table: The table, if there is one.
         nacelle: The key ``flight.nacelle``.
-        file: The file, for messages.
     """
     if table is None:
         return []
@@ -179,9 +178,7 @@ class NacelleLawGuard:
         """Give the command with the law's nacelle rate, and what went wrong, if anything.
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command.
-            dt: Length of the frame [s].
         """
         if self._law is None:
             return command, ""

@@ -75,7 +75,6 @@ def trial_problems(
         pulses: The script.
         trial: The test, or None.
         has_events: Whether the scenario hands the controls over.
-        file: The file, for the messages.
     """
     from rtsim.measures.trial_metrics import TRIAL_METRICS
 

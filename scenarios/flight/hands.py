@@ -118,12 +118,7 @@ class Hands:
         return command
 
     def after(self, row: FloatArray, dt: float) -> None:
-        """Look at the frame that was flown.
-
-        Args:
-            row: Its row.
-            dt: Length of a frame [s].
-        """
+        """Look at the frame that was flown."""
         # The command angle of the actuator at the start of the coming frame.
         self._angle = deg(row[COLUMN.nacelle_reference_deg] + row[COLUMN.nacelle_command_rate_deg_s] * dt)
         self._airspeed = row[COLUMN.airspeed_kt] * KNOT

@@ -57,7 +57,6 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
 
     Args:
         options: What the user wants.
-        scenario: What is flown.
 
     Returns:
         The settings, and a warning to print or None.
@@ -134,7 +133,6 @@ def refuse_unpaced(scenario: Scenario, *, paced: bool) -> None:
     """Refuse MAVLink in a flight that is flown as fast as it goes: nobody could follow it.
 
     Args:
-        scenario: What is flown.
         paced: Whether the flight is paced.
 
     Raises:

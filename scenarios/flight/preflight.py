@@ -45,11 +45,7 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
 
 
 def start_problems(scenario: Scenario) -> list[InputError]:
-    """Whether the aircraft can be trimmed where a scenario starts; an empty list where it can.
-
-    Args:
-        scenario: What is to be flown.
-    """
+    """Whether the aircraft can be trimmed where a scenario starts; an empty list where it can."""
     start = scenario.start
     if (start.airspeed, start.nacelle_angle) in START_CONDITIONS.values():
         return []

@@ -151,7 +151,6 @@ def flown_trim(flight: Flight, *, level: bool = False) -> FloatArray:
     """Trimmed flapping along a flight at the acceleration of its reference [deg], shape (frames,).
 
     Args:
-        flight: The flight.
         level: Leave the acceleration out, as the paper's map does.
     """
     acceleration = 0.0 if level else np.gradient(flight["airspeed_reference_kt"], flight.time)

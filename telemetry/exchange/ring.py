@@ -95,12 +95,7 @@ class Ring:
         return int(self._header[_HEARTBEAT]) if self._open else 0
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Publish one row; costs about a microsecond and never waits.
-
-        Args:
-            row: The frame's signals, shape (SIGNAL_COUNT,).
-            timing: The frame's wall-clock columns, shape (TIMING_COUNT,).
-        """
+        """Publish one row; costs about a microsecond and never waits."""
         written = self._written
         slot = written & self._mask
         self._history[slot][:] = row

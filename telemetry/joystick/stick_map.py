@@ -212,7 +212,6 @@ def parse_stick_map(text: str, *, file: str) -> StickMap:
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the message.
 
     Raises:
         InputError: For the first mistake found.

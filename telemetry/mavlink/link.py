@@ -165,12 +165,7 @@ class MavlinkLink:
         return self.ready
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show a frame; about a microsecond, never waits.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Its wall-clock columns, shape (TIMING_COUNT,).
-        """
+        """Show a frame; about a microsecond, never waits."""
         self._ring.push(row, timing)
 
     def report(self, feedback: Feedback) -> None:

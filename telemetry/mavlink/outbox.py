@@ -28,7 +28,6 @@ class Outbox:
             config: The vehicle's settings.
             exchange: Shared memory to the flight.
             send: Sends a datagram; must not wait and not raise.
-            now: Monotonic time [s].
         """
         self.config = config
         self.now = now

@@ -1,4 +1,10 @@
-"""The protocols beside commands: parameters, missions (there are none), time synchronisation, ping, files (none)."""
+"""The protocols beside commands: parameters, missions (there are none), time synchronisation, ping, files (none).
+
+Legend:
+    message: The request.
+    frame: Its frame.
+    peer: Who asked.
+"""
 
 from __future__ import annotations
 
@@ -64,13 +70,7 @@ class Services:
     # Parameters
 
     def list_parameters(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
-        """Begin to send all parameters; a list under way goes on.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Begin to send all parameters; a list under way goes on."""
         peer.parameter_next = max(peer.parameter_next, 0)
 
     def continue_list(self, peer: Peer) -> None:
@@ -88,13 +88,7 @@ class Services:
             peer.parameter_next += 1
 
     def read_parameter(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer PARAM_REQUEST_READ, by index or name.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer PARAM_REQUEST_READ, by index or name."""
         store = self._outbox.store
         name = _name(message.param_id)
         place = store.index.get(name, -1) if message.param_index < 0 else message.param_index
@@ -104,13 +98,7 @@ class Services:
             self._parameter_error(frame, peer, name, message.param_index, _NOT_FOUND)
 
     def set_parameter(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer PARAM_SET: everybody hears the value now in force.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer PARAM_SET: everybody hears the value now in force."""
         outbox = self._outbox
         name = _name(message.param_id)
         place = outbox.store.index.get(name)
@@ -144,11 +132,7 @@ class Services:
                 peer.parameter_next = 0
 
     def follow_flight(self, now: float) -> None:
-        """Let the parameters of pilot and aids say what is true, also after buttons, keys and modes.
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """Let the parameters of pilot and aids say what is true, also after buttons, keys and modes."""
         outbox = self._outbox
         if not outbox.state.started:
             return
@@ -179,7 +163,6 @@ class Services:
 
         Args:
             name: The parameter.
-            now: Monotonic time [s].
         """
         outbox = self._outbox
         value = outbox.store[name]
@@ -225,24 +208,12 @@ class Services:
     # Missions: none, said at once, since silence costs a ground station many seconds
 
     def mission_count(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer MISSION_REQUEST_LIST: nothing is stored.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer MISSION_REQUEST_LIST: nothing is stored."""
         answer = dialect.MAVLink_mission_count_message(frame.system_id, frame.component_id, 0, message.mission_type)
         self._outbox.reply(peer, answer)
 
     def mission_result(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer any other mission request.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer any other mission request."""
         result = _MISSION_RESULTS[frame.message_id]
         answer = dialect.MAVLink_mission_ack_message(
             frame.system_id, frame.component_id, result, getattr(message, "mission_type", 0)
@@ -252,13 +223,7 @@ class Services:
     # Clocks
 
     def timesync(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
-        """Answer a TIMESYNC request with the simulated time.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer a TIMESYNC request with the simulated time."""
         if message.tc1 == 0:
             now_ns = self._outbox.state.boot_ns(self._outbox.now)
             self._outbox.reply(peer, dialect.MAVLink_timesync_message(now_ns, message.ts1))
@@ -268,21 +233,13 @@ class Services:
 
         Args:
             message: The ping.
-            frame: Its frame.
-            peer: Who asked.
         """
         if message.target_system == 0 and message.target_component == 0:
             answer = dialect.MAVLink_ping_message(message.time_usec, message.seq, frame.system_id, frame.component_id)
             self._outbox.reply(peer, answer)
 
     def refuse_file_transfer(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Say no to a file request, so that the client goes on without waiting.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Say no to a file request, so that the client goes on without waiting."""
         asked = bytes(message.payload)
         sequence = (int.from_bytes(asked[:2], "little") + 1) & 0xFFFF
         payload = bytearray(251)

@@ -58,7 +58,6 @@ class Vehicle(Outbox):
             config: Its settings.
             exchange: Shared memory to the flight.
             send: Sends a datagram; must not wait and not raise.
-            now: Monotonic time [s].
 
         Raises:
             InputError: A setting, the signing key or the stored parameters are wrong.
@@ -91,7 +90,6 @@ class Vehicle(Outbox):
             datagram: What came.
             address: From where.
             received_ns: When, monotonic [ns].
-            now: Monotonic time [s].
         """
         self.now = now
         self.exchange.header[RECEIVED] += 1
@@ -173,7 +171,6 @@ class Vehicle(Outbox):
 
         Args:
             rows: Full rows, oldest first; may be empty.
-            now: Monotonic time [s].
         """
         starts = not self.state.started
         if self.state.observe(rows, now):
@@ -192,9 +189,6 @@ class Vehicle(Outbox):
 
     def tick(self, now: float) -> float:
         """Do what is due.
-
-        Args:
-            now: Monotonic time [s].
 
         Returns:
             When to call again at the latest, monotonic [s].

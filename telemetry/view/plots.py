@@ -145,11 +145,7 @@ class Plots:
 
 
 def acting_on(row: FloatArray) -> int:
-    """What the protection law changes in a row: 1 the stick, 2 the lever, 4 the nacelles, or their sum.
-
-    Args:
-        row: A frame's signals.
-    """
+    """What the protection law changes in a row: 1 the stick, 2 the lever, 4 the nacelles, or their sum."""
     return sum(1 << place for place, column in enumerate(_REASONS) if row[column])
 
 
@@ -158,7 +154,6 @@ def set_row_time(recording: Any, row: FloatArray) -> None:
 
     Args:
         recording: The ``rerun.RecordingStream``.
-        row: A frame's signals.
     """
     recording.set_time("sim_time", duration=float(row[COLUMN.time_s]))
     recording.set_time("step", sequence=int(row[COLUMN.frame]))

@@ -52,7 +52,6 @@ class Scene:
         """Show the aircraft as it is in one row.
 
         Args:
-            row: A frame's signals.
             trail: The place is part of the path.
         """
         time_s, nacelle = float(row[COLUMN.time_s]), math.radians(row[COLUMN.nacelle_deg])

@@ -118,12 +118,7 @@ class RerunView:
         return self._ready
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show one row; never waits.
-
-        Args:
-            row: The frame's signals, shape (SIGNAL_COUNT,).
-            timing: Its wall-clock columns, shape (TIMING_COUNT,).
-        """
+        """Show one row; never waits."""
         self._ring.push(row, timing)
         self._pushes += 1
         if self._pushes % _ROWS_PER_WATCH == 0:

@@ -68,7 +68,6 @@ def linearize_at(tables: AircraftTables, condition: Condition, trim: TrimPoint, 
 
     Args:
         tables: The aircraft, already at the condition.
-        condition: The flight condition.
         trim: The trim point.
         step_scale: Multiplies every step.
     """

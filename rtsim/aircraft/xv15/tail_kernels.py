@@ -28,7 +28,6 @@ def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) 
     Args:
         tail: The tables.
         alpha: Fuselage angle of attack [rad].
-        nacelle: Nacelle angle [rad].
         flap: Flap deflection [rad].
     """
     k, part = _bracket(tail.downwash_nacelle, nacelle)

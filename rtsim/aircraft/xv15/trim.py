@@ -180,7 +180,6 @@ def solve_trim(tables: AircraftTables, condition: Condition, guess: TrimPoint | 
 
     Args:
         tables: The aircraft, already at the condition.
-        condition: The flight condition.
         guess: A neighbouring trim, or None to search for the unstalled trim.
 
     Returns:

@@ -45,7 +45,6 @@ def trim_vectors(tables: AircraftTables, flight: Flight, z: FloatArray, x: Float
     """State and inputs of a set of unknowns; the actuators stand where stick and lever ask them to, stops ignored.
 
     Args:
-        tables: The aircraft.
         flight: Airspeed, acceleration, nacelle angle.
         z: Unknowns.
         x: Written: state.
@@ -74,7 +73,6 @@ def trim_residual(tables: AircraftTables, flight: Flight, z: FloatArray, residua
     """Scaled residuals of a set of unknowns.
 
     Args:
-        tables: The aircraft.
         flight: Airspeed, acceleration, nacelle angle.
         z: Unknowns.
         residual: Written: residuals.
@@ -93,7 +91,6 @@ def trim_jacobian(tables: AircraftTables, flight: Flight, z: FloatArray, jacobia
     """Jacobian of the residuals by central differences.
 
     Args:
-        tables: The aircraft.
         flight: Airspeed, acceleration, nacelle angle.
         z: Unknowns.
         jacobian: Written: derivative of residual (row) with respect to unknown (column).

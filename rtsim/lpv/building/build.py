@@ -69,8 +69,6 @@ class GridAircraft(Protocol):
         """Trim, or None where none is found from this guess.
 
         Args:
-            airspeed: Horizontal airspeed [m/s].
-            nacelle: Nacelle angle [rad].
             acceleration: Level acceleration [m/s^2].
             guess: State and input to start from; None where there is no neighbour yet.
         """
@@ -80,8 +78,6 @@ class GridAircraft(Protocol):
 
         Args:
             point: The trim.
-            airspeed: Its airspeed [m/s].
-            nacelle: Its nacelle angle [rad].
         """
 
     def far_apart(self, point: GridPoint, neighbour: GridPoint) -> bool:
@@ -97,18 +93,11 @@ class GridAircraft(Protocol):
 
         Args:
             point: The trim.
-            airspeed: Its airspeed [m/s].
-            nacelle: Its nacelle angle [rad].
             acceleration: Its level acceleration [m/s^2].
         """
 
     def flap(self, airspeed: float, nacelle: float) -> float:
-        """Flap deflection of the schedule [rad].
-
-        Args:
-            airspeed: Horizontal airspeed [m/s].
-            nacelle: Nacelle angle [rad].
-        """
+        """Flap deflection of the schedule [rad]."""
 
 
 Row = list[GridPoint | None]

@@ -103,7 +103,6 @@ def check_neighbours(
     """Predict every trim from its neighbours' linear models.
 
     Args:
-        database: The database.
         inside: Grid points to take part (V, N), for instance those within the corridor; None takes all valid ones.
         layer: The layer to check; None takes level flight.
 
@@ -203,7 +202,6 @@ def describe(error: NeighbourError, database: Database) -> str:
 
     Args:
         error: The pair.
-        database: Its database.
 
     Returns:
         One line of text.

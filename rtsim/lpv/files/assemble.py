@@ -33,7 +33,6 @@ def assemble_database(
         variables: States, inputs and outputs under ``state``, ``input`` and ``output``.
         attributes: Attributes of the file.
         pilot: Pilot gains by name of the design.
-        file: Name of the file, for messages.
 
     Returns:
         The checked database.
