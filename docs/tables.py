@@ -1,6 +1,6 @@
-"""Writes the tables of a flight's options into the pages, from their declaration in ``rtsim/loop/options.py``.
+"""Writes the tables of a flight's options and of its metrics into the pages.
 
-After a change of the declaration:
+They are declared in ``rtsim/loop/options.py`` and ``rtsim/measures/metric_kernels.py``. After a change there:
 
     python -m docs.tables
 """
@@ -8,9 +8,14 @@ After a change of the declaration:
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rtsim.loop.options import Option, declared
+
+if TYPE_CHECKING:
+    from rtsim.measures.metric_kernels import Metric
 
 DOCS = Path(__file__).parent
 BEGIN, END = "<!-- written by python -m docs.tables -->", "<!-- end -->"
@@ -38,19 +43,43 @@ def command_table() -> str:
     return "\n".join(lines)
 
 
-TABLES = {"scenarios.md": scenario_table, "commands.md": command_table}
-"""Pages with a table, and what makes it."""
+def flight_metrics_table() -> str:
+    """What ``rtsim fly --json`` measures."""
+    from rtsim.measures.metrics import FlightMetrics
+
+    return _metrics_table("key", FlightMetrics.shown)
+
+
+def trial_metrics_table() -> str:
+    """What trials and campaigns measure."""
+    from rtsim.measures.metrics import TrialMetrics
+
+    return _metrics_table("metric", TrialMetrics.shown)
+
+
+def _metrics_table(heading: str, shown: Mapping[str, Metric]) -> str:
+    lines = [f"| {heading} | meaning |", "|---|---|"]
+    return "\n".join([*lines, *(_row(f"`{name}`", item.text) for name, item in shown.items())])
+
+
+TABLES: dict[str, tuple[Callable[[], str], ...]] = {
+    "scenarios.md": (scenario_table, flight_metrics_table),
+    "commands.md": (command_table,),
+    "testing-protection.md": (trial_metrics_table,),
+}
+"""Pages with tables, and what makes each, in order."""
 
 
 def with_table(page: str, text: str) -> str:
-    """A page with its table as the declaration has it now.
+    """A page with its tables as the declarations have them now.
 
     Args:
         page: Name of the page.
         text: The page as it is.
     """
-    table = f"{BEGIN}\n{TABLES[page]()}\n{END}"
-    return re.sub(f"{re.escape(BEGIN)}.*?{re.escape(END)}", lambda _: table, text, flags=re.DOTALL)
+    tables = iter(TABLES[page])
+    pattern = f"{re.escape(BEGIN)}.*?{re.escape(END)}"
+    return re.sub(pattern, lambda _: f"{BEGIN}\n{next(tables)()}\n{END}", text, flags=re.DOTALL)
 
 
 def _row(*cells: str) -> str:

@@ -20,7 +20,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.loop.setup import FlightSetup
 from rtsim.loop.simulation import Simulation
-from rtsim.measures.figures import FlightFigures, figures_of_rows
+from rtsim.measures.metrics import FlightFigures, measured
 from rtsim.nacelle.automatic import AutomaticNacelle
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import AccelerationCaps, ConversionPath
@@ -86,6 +86,11 @@ def fly(
     )
     count = len(seeds)
     return {name: flown[k * count : (k + 1) * count] for k, name in enumerate(paths)}
+
+
+def figures_of(flight: Flight) -> FlightFigures:
+    """Measure a flight."""
+    return FlightFigures(measured(flight.rows, flight.programme, 0.004, ended=not flight.completed))
 
 
 def say(line: str) -> None:
@@ -156,7 +161,7 @@ def optimum_and_paths(paths: dict[str, ConversionPath]) -> None:
         wide = {"linewidth": 2.4} if name == "optimum" else {"linewidth": 1.2}
         left.plot(flight["airspeed_kt"][::10], flight["nacelle_deg"][::10], color=COLOURS[name], **wide)
         right.plot(flight.time[::10], flight["flapping_deg"][::10], color=COLOURS[name], label=TITLES[name], **wide)
-        found = figures_of_rows(flight.rows, 0.004)
+        found = figures_of(flight)
         arrived = flight.time[np.argmax(flight["airspeed_kt"] >= 169.5)]
         row(TITLES[name], f"{arrived:.1f}", f"{found.flapping_integral_deg_s:.1f}", f"{found.flapping_peak_deg:.2f}",
             f"{found.stick.rms_rate:.3f}", f"{found.lever.rms_rate:.4f}", f"{found.worst_margin_kt:.1f}",
@@ -212,8 +217,8 @@ def accelerations() -> None:
     for acceleration in (1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5):
         path = centre_line_variable(acceleration_kt_s=acceleration)
         flight = Flyer(BASELINE).fly(path.name, path)
-        real = figures_of_rows(truth.fly(path.name, path).rows, 0.004)
-        found = figures_of_rows(flight.rows, 0.004)
+        real = figures_of(truth.fly(path.name, path))
+        found = figures_of(flight)
         arrived = flight.time[np.argmax(flight["airspeed_kt"] >= 169.5)]
         row(f"{acceleration:g}", f"{arrived:.1f}", f"{found.flapping_integral_deg_s:.0f}",
             f"{found.flapping_peak_deg:.2f} ({real.flapping_peak_deg:.2f})", f"{found.stick.rms_rate:.3f}",
@@ -252,7 +257,7 @@ def pilots(paths: dict[str, ConversionPath]) -> None:
         loop = "pi" if "PI" in title else "integrators"
         flyer = Flyer(Variant(name="study", title=title, outer_loop=loop, pilot=settings), jobs=2)
         flights: list[Flight] = [flyer.fly(name, path) for name, path in paths.items()]
-        flown[title] = [figures_of_rows(flight.rows, 0.004) for flight in flights]
+        flown[title] = [figures_of(flight) for flight in flights]
         row(title, *(f"{f.flapping_integral_deg_s:.0f} / {f.stick.rms_rate:.2f} / {f.altitude_deviation_m:.1f}"
                      + ("" if f.completed else " (ended)") for f in flown[title]))  # fmt: skip
     figure = picture(11.0, 3.8)

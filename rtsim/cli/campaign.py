@@ -141,7 +141,7 @@ def _save(result: CampaignResult, report: dict[str, Any], folder: Path) -> None:
     """Write the report, and every flight with its metrics."""
     import json
 
-    from rtsim.measures.trial_metrics import TRIAL_METRICS
+    from rtsim.measures.metrics import TRIAL_METRICS, TrialMetrics
 
     write_whole(folder / "report.json", json.dumps(_finite(report), indent=1))
     with (
@@ -153,7 +153,9 @@ def _save(result: CampaignResult, report: dict[str, Any], folder: Path) -> None:
         for item, metrics in zip(result.spec.classes, result.flights.metrics, strict=True):
             for run, laws in enumerate(metrics):
                 for law, values in zip(result.task.laws, laws, strict=True):
-                    table.writerow([item.name, run, law.label, *(f"{value:.9g}" for value in values)])
+                    table.writerow(
+                        [item.name, run, law.label, *(f"{value:.9g}" for value in TrialMetrics(values).values())]
+                    )
 
 
 def _finite(value: Any) -> Any:

@@ -219,7 +219,7 @@ def _points(path: ConversionPath) -> list[dict[str, float]]:
 def _print(summary: dict[str, Any]) -> None:
     from rich.table import Table
 
-    from rtsim.measures.figures import OBJECTIVES
+    from rtsim.measures.metrics import OBJECTIVES
 
     best = summary["best"]
     words = OBJECTIVES[best["objective"]]

@@ -16,6 +16,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from rtsim.kernels.packed import Address
+
 _INTERPRETED: list[Callable[..., float]] = []
 """Parts where numba is switched off (``NUMBA_DISABLE_JIT``); an address is a place in this list, from 1."""
 
@@ -72,7 +74,8 @@ if numba.config.DISABLE_JIT:
             address: From ``address_of``; must not be 0.
             arguments: Its arguments.
         """
-        return _INTERPRETED[address - 1](*arguments)
+        given = (one.target if isinstance(one, Address) else one for one in arguments)
+        return _INTERPRETED[address - 1](*given)
 
 else:
 

@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-import numpy as np
-
 from rtsim.loop.data import CLOCK
 from rtsim.loop.setup import FlightSetup, build_parts, prepare
-from rtsim.measures import merit_kernels as kernels
-from rtsim.measures.figures import FlightFigures, figures_from_sums
+from rtsim.measures.metric_kernels import SUM, add_metrics
+from rtsim.measures.metrics import FlightFigures, finished, new_sums
 from rtsim.programme import Programme
 
 
@@ -82,9 +80,9 @@ class BatchFlyer:
         """Fly one in this thread."""
         seed = self.setup.options.seed if flight.seed is None else flight.seed
         setup = dataclasses.replace(self.setup.with_options(seed=seed), programme=flight.programme)
-        merit = np.zeros(kernels.MERIT_SIZE)
-        flying = prepare(setup, measure=(kernels.add_merit, merit), unlocked=True)
+        sums = new_sums(self._parts.database.profile)
+        flying = prepare(setup, measure=(add_metrics, sums), unlocked=True)
         duration = flight.programme.duration if flight.duration is None else flight.duration
         flying.run(max(1, math.ceil(duration * self.setup.options.rate_hz - 1e-6)))
-        merit[kernels.END_CODE] = flying.state.clock[CLOCK.end]
-        return figures_from_sums(merit, flying.tables.dt)
+        sums[SUM.ended] = flying.state.clock[CLOCK.end]
+        return FlightFigures(finished(sums, flying.tables.dt))

@@ -15,7 +15,7 @@ from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup
 from rtsim.lpv.files.storage import load_database
-from rtsim.measures.figures import FlightFigures, objective_value
+from rtsim.measures.metrics import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import ConversionPath, path_through
 from rtsim.optimization.paths import PATH_NAMES, conversion_end_kt, paper_path

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from rtsim.measures.figures import FlightFigures, objective_value
+from rtsim.measures.metrics import OBJECTIVES, FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import ConversionPath
 from rtsim.optimization.problem import ConversionProblem
@@ -91,9 +91,7 @@ def figures_summary(figures: FlightFigures) -> dict[str, Any]:
     Args:
         figures: The flight.
     """
-    from rtsim.measures.figures import OBJECTIVES
-
     return {
-        **dataclasses.asdict(figures),
+        **figures.asdict(),
         "objectives": {name: objective_value(figures, name) for name in OBJECTIVES},
     }

@@ -115,6 +115,8 @@ class LawChain:
         self.period = self.every * dt
         self.events: list[LawEvent] = []
         """What happened besides limiting."""
+        self.slow_calls = 0
+        """Calls so far that took longer than the time between two of them."""
         self.interventions: tuple[ChainedIntervention, ...] = ()
         """What the laws say they did in the last decision."""
         self.live, self.on_event, self.remember = live, on_event, remember
@@ -277,6 +279,7 @@ class LawChain:
             self._laws[place] = None
             self._fail(frame, name, answer.failure, answer.text)
             return None
+        self.slow_calls += answer.duration > self.period
         if self.live and answer.duration > self.period:
             self._waiting[place] = math.ceil(answer.duration / self.period) - 1
         if answer.command is not None:

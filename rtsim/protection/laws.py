@@ -150,9 +150,9 @@ class BuiltInLaw:
         """Margin to the limit that asked for an intervention; the least predicted one for the corridor."""
         limits = load_limits(self._database.profile)
         if reason == data.REASON_FLAP:
-            return limits.flapping - abs(sensors.flapping)
+            return float(limits.flapping - abs(sensors.flapping))
         if reason == data.REASON_PITCH:
-            return limits.pitch - abs(sensors.pitch)
+            return float(limits.pitch - abs(sensors.pitch))
         if reason == data.REASON_TORQUE:
             bound = limiter_kernels.torque_limit(limits.torque, sensors.airspeed, sensors.nacelle_angle)
             return float(1.0 - sensors.mast_torque / bound)

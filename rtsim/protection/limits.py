@@ -1,11 +1,11 @@
-"""The limits that are watched, their names, and their numbers from an aircraft's profile."""
+"""The numbers of the limits that are watched, and of the laws, from an aircraft's profile."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -14,74 +14,22 @@ from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
+from rtsim.protection.monitor_kernels import LIMIT_NUMBERS, LIMIT_WORDS
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt
 
-LimitKind = Literal[
-    "stall_attitude",
-    "load_torque",
-    "downstop_gate",
-    "nacelle_range",
-    "nacelle_rate",
-    "flap_stop",
-    "mast_torque",
-    "load_factor",
-    "pitch_attitude",
-    "consistency",
-    "sink",
-]
-LIMIT_KINDS: tuple[LimitKind, ...] = (
-    "stall_attitude",
-    "load_torque",
-    "downstop_gate",
-    "nacelle_range",
-    "nacelle_rate",
-    "flap_stop",
-    "mast_torque",
-    "load_factor",
-    "pitch_attitude",
-    "consistency",
-    "sink",
-)
+LIMIT_KINDS = tuple(name for name in LIMIT_WORDS if name != "time_to_limit")
 """Limits by name; the number of a limit is its place here, and a recorded reason is that number plus one."""
-LIMIT_WORDS: dict[str, str] = {
-    "stall_attitude": "low-speed side of the corridor",
-    "load_torque": "high-speed side of the corridor",
-    "downstop_gate": "downstop gate",
-    "nacelle_range": "nacelle range",
-    "nacelle_rate": "nacelle rate",
-    "flap_stop": "flapping",
-    "mast_torque": "mast torque",
-    "load_factor": "load factor",
-    "pitch_attitude": "pitch attitude",
-    "consistency": "aircraft's own trims",
-    "sink": "sink rate",
-    "time_to_limit": "time to the corridor's boundary",
-}
-"""Limits, and the time to the corridor's boundary, in words for people."""
+_SI = {"_deg_s": DEGREE, "_deg": DEGREE}
+"""SI value of one unit of a limit, by how its key ends; 1 for others."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits besides the corridor. SI and radians."""
+class Limits(SimpleNamespace):
+    """Limits besides the corridor, those of ``LIMIT`` by name among them. SI and radians."""
 
-    flapping: float
-    """Gimbal flapping at the stop [rad]."""
     torque: TorqueTables
     """Mast torque."""
     sink: SinkTables
     """Sink rate."""
-    load_factor_max: float
-    """Largest load factor."""
-    load_factor_min: float
-    """Smallest load factor."""
-    pitch: float
-    """Pitch attitude, either way [rad]."""
-    nacelle_forward: float
-    """Smallest nacelle angle [rad]."""
-    nacelle_aft: float
-    """Largest nacelle angle [rad]."""
-    nacelle_rate: float
-    """Fastest nacelle motion [rad/s]."""
     plant_guard: float
     """Distance a law's low side keeps from where the plant's unstalled trims end [m/s]."""
 
@@ -98,7 +46,6 @@ def load_limits(profile: AircraftProfile | None = None) -> Limits:
     """
     data = _part(profile).table("limits")
     return Limits(
-        flapping=deg(data.number("flapping_deg", low=0.1, high=60.0)),
         torque=TorqueTables(
             cruise=data.number("mast_torque_inlb", low=1.0, high=1e9) * INCH_POUND,
             takeoff=data.number("mast_torque_takeoff_inlb", low=1.0, high=1e9) * INCH_POUND,
@@ -111,19 +58,17 @@ def load_limits(profile: AircraftProfile | None = None) -> Limits:
             height=data.number("sink_height_m", low=0.0, high=1e4),
             time=data.number("sink_time_s", low=0.1, high=1e4),
         ),
-        load_factor_max=data.number("load_factor_max", low=1.0, high=20.0),
-        load_factor_min=data.number("load_factor_min", low=-20.0, high=1.0),
-        pitch=deg(data.number("pitch_deg", low=1.0, high=80.0)),
-        nacelle_forward=deg(data.number("nacelle_forward_deg", low=0.0, high=95.0)),
-        nacelle_aft=deg(data.number("nacelle_aft_deg", low=0.0, high=95.0)),
-        nacelle_rate=deg(data.number("nacelle_rate_deg_s", low=0.1, high=60.0)),
         plant_guard=kt(data.number("plant_guard_kt", low=0.0, high=100.0)),
+        **{
+            name: data.number(key, low=low, high=high) * next((_SI[end] for end in _SI if key.endswith(end)), 1.0)
+            for name, (key, low, high) in LIMIT_NUMBERS.items()
+        },
     )
 
 
 UNIT_SCALE = {"kn": KNOT, "deg": DEGREE, "deg/s": DEGREE, "%": 0.01, "": 1.0, "m/s": 1.0, "s": 1.0}
 """SI value of one unit of the levels' data."""
-WATCHED = (*LIMIT_KINDS, "time_to_limit")
+WATCHED = tuple(LIMIT_WORDS)
 """What has a margin and a level, in the order of the arrays."""
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +18,9 @@ from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
 from rtsim.protection.boundary import load_boundary, model_corridor
 from rtsim.protection.limits import WATCHED, LimitLevels, load_levels, load_limits
-from rtsim.protection.monitor_kernels import KIND_COUNT, MonitorTables
+from rtsim.protection.monitor_kernels import FAR, KIND, LIMIT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
-from rtsim.units import DEGREE, KNOT
+from rtsim.units import DEGREE
 
 SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
 """Quantities of the frame that sensors show under another name."""
@@ -47,17 +49,17 @@ class MarginHistory:
     time: FloatArray
     """Time (frames,) [s]."""
     margins: FloatArray
-    """Signed distances, positive inside (frames, KIND_COUNT), SI."""
+    """Signed distances, positive inside (frames, KIND.size), SI."""
     levels: FloatArray
-    """0 clear, 1 caution, 2 warning, 3 exceedance (frames, KIND_COUNT)."""
+    """0 clear, 1 caution, 2 warning, 3 exceedance (frames, KIND.size)."""
     normalized_distance: FloatArray
     """Signed distance to the nearer boundary in (10 kn, 10 deg) (frames,)."""
     time_to_limit: FloatArray
     """Predicted time until the corridor is left [s] (frames,)."""
     side: FloatArray
     """-1 low, 1 high, 0 none (frames,)."""
-    limit_levels: LimitLevels
-    """When each limit counts as exceeded."""
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    """Least margin to every limit, and time beyond it."""
 
     def of(self, name: str) -> FloatArray:
         """Margin of one limit over time (frames,).
@@ -68,22 +70,54 @@ class MarginHistory:
         column: FloatArray = self.margins[:, WATCHED.index(name)]
         return column
 
-    def summary(self) -> dict[str, dict[str, float]]:
-        """Least margin, time outside and highest level of each limit.
 
-        Returns:
-            By limit: ``worst`` in the unit of the levels' data (kn, deg, %, ...), ``outside_s``, ``level``.
+class MarginWatch:
+    """Margins and levels of rows that follow one another, and what they came to: the one way to watch a flight."""
+
+    def __init__(self, tables: MonitorTables, limits: LimitLevels, dt: float) -> None:
+        """Begin with all levels clear; compiles, or loads, what looks at rows.
+
+        Args:
+            tables: Limits and levels for the kernels.
+            limits: The levels for people.
+            dt: Length of a frame [s].
         """
-        step = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 0.0
-        found = {}
-        for k, name in enumerate(WATCHED):
-            margins = self.margins[:, k]
-            found[name] = {
-                "worst": float(margins.min()) / float(self.limit_levels.scale[k]),
-                "outside_s": step * int(np.count_nonzero(margins < self.limit_levels.threshold[k, 2])),
-                "level": float(self.levels[:, k].max()),
+        self.limits = limits
+        """Unit and levels of each limit."""
+        self._tables, self._dt = tables, dt
+        self._state = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
+        self._worst = np.full(KIND.size, np.inf)
+        self._outside = np.zeros(KIND.size, dtype=np.int64)
+        self.look(np.zeros((0, SENSOR.size)), np.zeros(0))
+
+    def reset(self) -> None:
+        """A new flight begins: all levels are clear."""
+        self._state[:] = 0.0
+
+    def look(self, sensors: FloatArray, ahead: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Margins and levels of the next rows, each of shape (frames, KIND.size).
+
+        Args:
+            sensors: What is known (frames, SENSOR.size).
+            ahead: Time to limit (frames,) [s].
+        """
+        margins, levels = np.empty((len(sensors), KIND.size)), np.empty((len(sensors), KIND.size))
+        monitor_kernels.watch(self._tables, sensors, ahead, self._dt, self._state, margins, levels)
+        self._worst = np.minimum(self._worst, margins.min(axis=0, initial=np.inf))
+        self._outside += np.count_nonzero(margins < self.limits.threshold[:, 2], axis=0)
+        return margins, levels
+
+    def summary(self) -> dict[str, dict[str, Any]]:
+        """Least margin, its unit, and time beyond the limit by limit, as ``rtsim fly --json`` prints them."""
+        return {
+            name: {
+                "worst_margin": float(self._worst[k] / self.limits.scale[k]),
+                "unit": self.limits.units[k],
+                "outside_s": int(self._outside[k]) * self._dt,
             }
-        return found
+            for k, name in enumerate(WATCHED)
+            if self._worst[k] < FAR and name != "nacelle_range"
+        }
 
 
 class MarginMonitor:
@@ -105,7 +139,7 @@ class MarginMonitor:
         self._limits = load_levels(database.profile)
         self._law = law_tables("monitor", database, dt=dt, boundary=boundary)
         self._law_state = np.zeros(law_data.LAW_STATE_SIZE)
-        self._levels = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
+        self._levels = MarginWatch(self.tables, self._limits, dt)
         self._work = np.zeros(law_data.WORK_SIZE)
         self._frame = 0
         self.reset()
@@ -113,7 +147,7 @@ class MarginMonitor:
     def reset(self) -> None:
         """Start anew: no level active, nothing learned."""
         law_kernels.law_start(self._law, self._law_state)
-        self._levels[:] = 0.0
+        self._levels.reset()
         self._frame = 0
 
     def step(self, sensors: Sensors, command: Command) -> Reading:
@@ -127,14 +161,12 @@ class MarginMonitor:
         acting = np.array([command.stick, command.lever, command.nacelle_rate])
         law_kernels.protect(self._law, self._law_state, self._frame, known, acting, acting.copy(), self._work)
         self._frame += 1
-        margins, levels = np.zeros(KIND_COUNT), np.zeros(KIND_COUNT)
         ahead = float(self._law_state[law_data.L_TIME])
-        monitor_kernels.limit_margins(self.tables, known, ahead, margins)
-        monitor_kernels.levels_step(self.tables, margins, self.dt, self._levels, levels)
+        margins, levels = self._levels.look(known[None, :], np.array([ahead]))
         side = float(self._law_state[law_data.L_SIDE])
         return Reading(
-            margins=dict(zip(WATCHED, margins.tolist(), strict=True)),
-            levels={name: LEVEL_NAMES[int(level)] for name, level in zip(WATCHED, levels, strict=True)},
+            margins=dict(zip(WATCHED, margins[0].tolist(), strict=True)),
+            levels={name: LEVEL_NAMES[int(level)] for name, level in zip(WATCHED, levels[0], strict=True)},
             normalized_distance=float(
                 monitor_kernels.normalized_distance(self.tables, sensors.airspeed, sensors.nacelle_angle)
             ),
@@ -154,12 +186,11 @@ class MarginMonitor:
         )
         frames = len(rows)
         ahead, side, distance = np.zeros(frames), np.zeros(frames), np.zeros(frames)
-        margins, levels = np.zeros((frames, KIND_COUNT)), np.zeros((frames, KIND_COUNT))
         monitor_kernels.predict(self._law, sensors, acting, ahead, side)
-        state = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
-        monitor_kernels.watch(self.tables, sensors, ahead, self.dt, state, margins, levels)
         monitor_kernels.distances(self.tables, sensors, distance)
-        return MarginHistory(rows[:, COLUMN.time_s].copy(), margins, levels, distance, ahead, side, self._limits)
+        watch = MarginWatch(self.tables, self._limits, self.dt)
+        time, (margins, levels) = rows[:, COLUMN.time_s].copy(), watch.look(sensors, ahead)
+        return MarginHistory(time, margins, levels, distance, ahead, side, watch.summary())
 
 
 def monitor_tables(boundary: str, database: Database) -> MonitorTables:
@@ -180,13 +211,7 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         plant=sample_boundary(model_corridor(database, limits)),
         torque=limits.torque,
         sink=limits.sink,
-        flapping=limits.flapping,
-        load_factor_max=limits.load_factor_max,
-        load_factor_min=limits.load_factor_min,
-        pitch=limits.pitch,
-        nacelle_forward=limits.nacelle_forward,
-        nacelle_aft=limits.nacelle_aft,
-        nacelle_rate=limits.nacelle_rate,
+        numbers=np.array([getattr(limits, name) for name in LIMIT.asdict()]),
         threshold=levels.threshold,
         hysteresis=levels.hysteresis,
         rise=levels.rise,
@@ -196,10 +221,7 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
 
 def compile_watch() -> None:
     """Compile, or load, what watches the rows of a flight."""
-    tables = monitor_tables("design", load_database())
-    none, sensors = np.zeros((0, KIND_COUNT)), np.zeros((0, SENSOR.size))
-    levels = np.zeros(monitor_kernels.LEVEL_STATE_SIZE)
-    monitor_kernels.watch(tables, sensors, np.zeros(0), 0.004, levels, none, none)
+    MarginWatch(monitor_tables("design", load_database()), load_levels(), 0.004)
 
 
 def sensor_array(sensors: Sensors) -> FloatArray:
@@ -222,21 +244,3 @@ def sensors_of_rows(rows: FloatArray) -> FloatArray:
     sensors[:, : len(places)] = rows[:, places] * UNIT_SCALES[places]
     sensors[:, SENSOR.nacelle_ok] = rows[:, COLUMN.failures].astype(np.int64) & NACELLES_JAMMED == 0
     return sensors
-
-
-def severity(depth: float, duration: float, *, lost: bool = False) -> str:
-    """Judge an exceedance of the corridor after the fact.
-
-    Args:
-        depth: How far outside [m/s].
-        duration: How long [s].
-        lost: Control was lost.
-
-    Returns:
-        ``none``, ``minor`` (at most 5 kn and 2 s), ``major``, or ``critical`` (more than 15 kn, or control lost).
-    """
-    if lost or depth > 15.0 * KNOT:
-        return "critical"
-    if depth <= 0.0:
-        return "none"
-    return "minor" if depth <= 5.0 * KNOT and duration <= 2.0 else "major"

@@ -11,6 +11,7 @@ from rtsim.arrays import FloatArray
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.kernels.compiled import inner_kernel, kernel
+from rtsim.places import Places
 from rtsim.protection.law_data import (
     L_SIDE,
     L_TIME,
@@ -26,11 +27,38 @@ from rtsim.protection.limiter_kernels import allowed_sink, torque_limit
 from rtsim.protection.prediction_kernels import BoundaryTables, speed_range
 from rtsim.units import DEGREE, KNOT
 
-KIND_STALL, KIND_LOAD, KIND_GATE, KIND_RANGE, KIND_RATE, KIND_FLAP = 0, 1, 2, 3, 4, 5
-KIND_TORQUE, KIND_NZ, KIND_PITCH, KIND_CONSISTENCY, KIND_SINK, KIND_TIME = 6, 7, 8, 9, 10, 11
-"""Places of the margins, the order of ``limits.LIMIT_KINDS``, and last the time to the corridor's boundary."""
-KIND_COUNT = 12
-LEVEL_STATE_SIZE = KIND_COUNT * 6
+LIMIT_WORDS = {
+    "stall_attitude": "low-speed side of the corridor",
+    "load_torque": "high-speed side of the corridor",
+    "downstop_gate": "downstop gate",
+    "nacelle_range": "nacelle range",
+    "nacelle_rate": "nacelle rate",
+    "flap_stop": "flapping",
+    "mast_torque": "mast torque",
+    "load_factor": "load factor",
+    "pitch_attitude": "pitch attitude",
+    "consistency": "aircraft's own trims",
+    "sink": "sink rate",
+    "time_to_limit": "time to the corridor's boundary",
+}
+"""Limits in words for people, in the order of the recorded reasons (a reason is a limit's place plus one), and last the
+time to the corridor's boundary. A new limit, before the last, has its margin in ``limit_margins``, a number in
+``LIMIT_NUMBERS``, and in an aircraft's ``protection`` that number and its levels."""
+KIND = Places(*LIMIT_WORDS)
+"""Places of the margins and levels."""
+LIMIT_NUMBERS = {
+    "flapping": ("flapping_deg", 0.1, 60.0),
+    "load_factor_max": ("load_factor_max", 1.0, 20.0),
+    "load_factor_min": ("load_factor_min", -20.0, 1.0),
+    "pitch": ("pitch_deg", 1.0, 80.0),
+    "nacelle_forward": ("nacelle_forward_deg", 0.0, 95.0),
+    "nacelle_aft": ("nacelle_aft_deg", 0.0, 95.0),
+    "nacelle_rate": ("nacelle_rate_deg_s", 0.1, 60.0),
+}
+"""Limits that are numbers: key under ``[limits]`` of an aircraft's profile, least and largest value allowed there."""
+LIMIT = Places(*LIMIT_NUMBERS)
+"""Their places; SI and radians."""
+LEVEL_STATE_SIZE = KIND.size * 6
 FAR = 1e3
 """A margin where the limit does not apply."""
 
@@ -48,24 +76,12 @@ class MonitorTables(NamedTuple):
     """Mast torque."""
     sink: SinkTables
     """Sink rate."""
-    flapping: float
-    """Flapping at the stop [rad]."""
-    load_factor_max: float
-    """Largest load factor."""
-    load_factor_min: float
-    """Smallest load factor."""
-    pitch: float
-    """Largest pitch attitude [rad]."""
-    nacelle_forward: float
-    """Smallest nacelle angle [rad]."""
-    nacelle_aft: float
-    """Largest nacelle angle [rad]."""
-    nacelle_rate: float
-    """Fastest nacelle motion [rad/s]."""
+    numbers: FloatArray
+    """Limits that are numbers, places ``LIMIT``."""
     threshold: FloatArray
-    """Margins below which caution, warning, exceedance begin (KIND_COUNT, 3)."""
+    """Margins below which caution, warning, exceedance begin (KIND.size, 3)."""
     hysteresis: FloatArray
-    """How far above its threshold a margin must rise before a level ends (KIND_COUNT,)."""
+    """How far above its threshold a margin must rise before a level ends (KIND.size,)."""
     rise: float
     """How long a margin must be below a threshold [s]."""
     fall: float
@@ -80,25 +96,25 @@ def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: flo
         tables: The limits.
         sensors: What is known, order of ``rtsim.command.Sensors``.
         time_to_limit: Predicted time to the corridor's boundary [s].
-        out: Written, shape (KIND_COUNT,): m/s for speeds, rad and rad/s for angles, share of the limit for torque.
+        out: Written, shape (KIND.size,): m/s for speeds, rad and rad/s for angles, share of the limit for torque.
     """
-    airspeed, angle = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle]
+    airspeed, angle, numbers = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], tables.numbers
     low, high = speed_range(tables.chart, angle)
-    out[KIND_STALL] = airspeed - low
-    out[KIND_LOAD] = high - airspeed
+    out[KIND.stall_attitude] = airspeed - low
+    out[KIND.load_torque] = high - airspeed
     # On the downstop the gate is closed, margin negative, while leaving it would be over the limit off it.
-    out[KIND_GATE] = tables.chart.high[0] - airspeed if sensors[SENSOR.on_downstop] != 0.0 else FAR
-    out[KIND_RANGE] = min(angle - tables.nacelle_forward, tables.nacelle_aft - angle)
-    out[KIND_RATE] = tables.nacelle_rate - abs(sensors[SENSOR.nacelle_rate])
-    out[KIND_FLAP] = tables.flapping - abs(sensors[SENSOR.flapping])
-    out[KIND_TORQUE] = 1.0 - sensors[SENSOR.mast_torque] / torque_limit(tables.torque, airspeed, angle)
+    out[KIND.downstop_gate] = tables.chart.high[0] - airspeed if sensors[SENSOR.on_downstop] != 0.0 else FAR
+    out[KIND.nacelle_range] = min(angle - numbers[LIMIT.nacelle_forward], numbers[LIMIT.nacelle_aft] - angle)
+    out[KIND.nacelle_rate] = numbers[LIMIT.nacelle_rate] - abs(sensors[SENSOR.nacelle_rate])
+    out[KIND.flap_stop] = numbers[LIMIT.flapping] - abs(sensors[SENSOR.flapping])
+    out[KIND.mast_torque] = 1.0 - sensors[SENSOR.mast_torque] / torque_limit(tables.torque, airspeed, angle)
     nz = sensors[SENSOR.load_factor]
-    out[KIND_NZ] = min(tables.load_factor_max - nz, nz - tables.load_factor_min)
-    out[KIND_PITCH] = tables.pitch - abs(sensors[SENSOR.pitch])
+    out[KIND.load_factor] = min(numbers[LIMIT.load_factor_max] - nz, nz - numbers[LIMIT.load_factor_min])
+    out[KIND.pitch_attitude] = numbers[LIMIT.pitch] - abs(sensors[SENSOR.pitch])
     low, high = speed_range(tables.plant, angle)
-    out[KIND_CONSISTENCY] = min(airspeed - low, high - airspeed)
-    out[KIND_SINK] = allowed_sink(tables.sink, airspeed, sensors[SENSOR.altitude]) + sensors[SENSOR.climb_rate]
-    out[KIND_TIME] = time_to_limit
+    out[KIND.consistency] = min(airspeed - low, high - airspeed)
+    out[KIND.sink] = allowed_sink(tables.sink, airspeed, sensors[SENSOR.altitude]) + sensors[SENSOR.climb_rate]
+    out[KIND.time_to_limit] = time_to_limit
 
 
 @inner_kernel
@@ -112,10 +128,10 @@ def levels_step(tables: MonitorTables, margins: FloatArray, dt: float, state: Fl
         margins: From ``limit_margins``.
         dt: Length of the frame [s].
         state: Updated in place, zeros at the start, shape (LEVEL_STATE_SIZE,).
-        levels: Written: 0 clear, 1 caution, 2 warning, 3 exceedance, shape (KIND_COUNT,).
+        levels: Written: 0 clear, 1 caution, 2 warning, 3 exceedance, shape (KIND.size,).
     """
     tolerance = 0.5 * dt
-    for kind in range(KIND_COUNT):
+    for kind in range(KIND.size):
         level = 0.0
         for k in range(3):
             active = 6 * kind + 2 * k
@@ -190,8 +206,8 @@ def watch(
         time_to_limit: One per frame (frames,) [s].
         dt: Length of a frame [s].
         state: Of the levels, updated in place, zeros at the start of a flight (LEVEL_STATE_SIZE,).
-        margins: Written (frames, KIND_COUNT).
-        levels: Written (frames, KIND_COUNT).
+        margins: Written (frames, KIND.size).
+        levels: Written (frames, KIND.size).
     """
     for k in range(sensors.shape[0]):
         limit_margins(tables, sensors[k], time_to_limit[k], margins[k])

@@ -16,13 +16,13 @@ from rtsim.choices import CorridorName
 from rtsim.errors import InputError
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
+from rtsim.measures.metric_kernels import VALUE
 from rtsim.protection.laws import LawSpec, load_laws
 from rtsim.protection.tables import LAW_NAMES
 from rtsim.units import kt
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.spec import CampaignFile, parse_campaign
 from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
-from scenarios.campaign.trial_kernels import METRIC_COUNT
 
 CHUNK_RUNS = 10
 """Runs of one class in a piece of work; not to be changed within a campaign, since pieces are what is kept."""
@@ -87,7 +87,7 @@ class ChunkResult:
     chunk: Chunk
     """The piece."""
     metrics: FloatArray
-    """Metrics of every flight, shape (runs, laws, METRIC_COUNT)."""
+    """Metrics of every flight, shape (runs, laws, VALUE.size)."""
     problems: tuple[tuple[int, int, str], ...]
     """What went wrong in laws: run, law, sentence."""
     seconds: FloatArray
@@ -123,7 +123,7 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
     spec = _spec(task.text, task.file)
     _refuse_another(task)
     bench = Bench()
-    metrics = np.zeros((chunk.count, len(task.laws), METRIC_COUNT))
+    metrics = np.zeros((chunk.count, len(task.laws), VALUE.size))
     seconds = np.zeros(len(task.laws))
     problems: list[tuple[int, int, str]] = []
     for k in range(chunk.count):
@@ -134,7 +134,7 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
             # The first run of every class asks laws in Python everything twice.
             flight = fly_law(bench, plan, law, folder=task.folder, repeat=run == 0)
             seconds[number] += time.process_time() - begin
-            metrics[k, number] = flight.metrics.values
+            metrics[k, number] = flight.metrics.numbers
             problems += [(run, number, text) for text in flight.law_problems]
     return ChunkResult(chunk, metrics, tuple(problems), seconds)
 

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from rtsim.arrays import BoolArray, FloatArray
-from rtsim.measures.trial_metrics import METRIC_PLACE, SECONDARY_LIMITS, TrialMetrics, violations
+from rtsim.measures.metric_kernels import VALUE
+from rtsim.measures.metrics import SECONDARY_LIMITS, TrialMetrics, violations
 
 DEEP_KT = 5.0
 """Depth beyond which an exceedance is major [kn]."""
@@ -19,7 +20,7 @@ DELAY_S = 0.5
 """Later end of the conversion (``conversion_s``) that counts as a delay [s]."""
 
 EventTest = Callable[[FloatArray, FloatArray], BoolArray]
-"""Metrics of protected flights and of their twins, (flights, METRIC_COUNT) each, to whether it happened (flights,)."""
+"""Metrics of protected flights and of their twins, (flights, VALUE.size) each, to whether it happened (flights,)."""
 
 
 def new_violations(law: TrialMetrics, off: TrialMetrics) -> frozenset[str]:
@@ -32,27 +33,22 @@ def new_violations(law: TrialMetrics, off: TrialMetrics) -> frozenset[str]:
     return (law.exceeded - off.exceeded) & frozenset(SECONDARY_LIMITS)
 
 
-def _of(values: FloatArray, name: str) -> FloatArray:
-    column: FloatArray = values[:, METRIC_PLACE[name]]
-    return column
-
-
 def _exceeded(law: FloatArray, off: FloatArray) -> BoolArray:
     del off
-    return _of(law, "exceedances") > 0.0
+    return law[:, VALUE.exceedances] > 0.0
 
 
 def _deep(law: FloatArray, off: FloatArray) -> BoolArray:
-    return _exceeded(law, off) & (_of(law, "depth_kt") > DEEP_KT)
+    return _exceeded(law, off) & (law[:, VALUE.depth_kt] > DEEP_KT)
 
 
 def _activated(law: FloatArray, off: FloatArray) -> BoolArray:
     del off
-    return _of(law, "corridor_activations") > 0.0
+    return law[:, VALUE.corridor_activations] > 0.0
 
 
 def _nuisance(law: FloatArray, off: FloatArray) -> BoolArray:
-    return _activated(law, off) & (_of(off, "worst_margin_kt") > NUISANCE_MARGIN_KT)
+    return _activated(law, off) & (off[:, VALUE.worst_margin_kt] > NUISANCE_MARGIN_KT)
 
 
 def _violated(name: str) -> EventTest:
@@ -60,7 +56,7 @@ def _violated(name: str) -> EventTest:
 
 
 def _height_harm(law: FloatArray, off: FloatArray) -> BoolArray:
-    return _of(law, "height_lost_m") > _of(off, "height_lost_m") + NO_HARM_HEIGHT
+    return law[:, VALUE.height_lost_m] > off[:, VALUE.height_lost_m] + NO_HARM_HEIGHT
 
 
 def _harmed(law: FloatArray, off: FloatArray) -> BoolArray:
@@ -72,7 +68,7 @@ def _harmed(law: FloatArray, off: FloatArray) -> BoolArray:
 
 
 def _delayed(law: FloatArray, off: FloatArray) -> BoolArray:
-    return _of(law, "conversion_s") > _of(off, "conversion_s") + DELAY_S
+    return law[:, VALUE.conversion_s] > off[:, VALUE.conversion_s] + DELAY_S
 
 
 EVENTS: Mapping[str, EventTest] = {

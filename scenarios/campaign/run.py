@@ -16,6 +16,7 @@ from rtsim.errors import InputError
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
+from rtsim.measures.metric_kernels import VALUE
 from scenarios.campaign.chunks import (
     ChunkResult,
     LawVariant,
@@ -27,7 +28,6 @@ from scenarios.campaign.chunks import (
 from scenarios.campaign.executors import Executor, LocalExecutor
 from scenarios.campaign.spec import CampaignFile
 from scenarios.campaign.store import Store
-from scenarios.campaign.trial_kernels import METRIC_COUNT
 from scenarios.campaign.verdict import Flights, Judged, decided, judge, summarize
 
 PROBLEMS_SHOWN = 5
@@ -270,7 +270,7 @@ def identity(task: Task) -> dict[str, Any]:
         "seed": task.seed,
         "plant": task.options.plant,
         "rate_hz": task.options.rate_hz,
-        "metrics": METRIC_COUNT,
+        "metrics": list(VALUE.asdict()),
         "database": task.aircraft_hash,
         "versions": versions() | {"rtsim": rtsim.__version__},
     }
@@ -296,7 +296,7 @@ def _law_code(laws: Sequence[LawVariant], folder: str) -> dict[str, str]:
 def _flights(
     spec: CampaignFile, laws: tuple[LawVariant, ...], results: Sequence[ChunkResult], planned: tuple[int, ...]
 ) -> Flights:
-    empty = np.zeros((0, len(laws), METRIC_COUNT))
+    empty = np.zeros((0, len(laws), VALUE.size))
     return Flights(
         spec=spec,
         laws=laws,

@@ -19,12 +19,9 @@ from rtsim.loop.setup import FlightSetup, build_parts, start_trim
 from rtsim.loop.simulation import Simulation
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database
-from rtsim.measures.trial_metrics import TORQUE_EXCESS, TrialMetrics
+from rtsim.measures.metrics import TrialMetrics, measured
 from rtsim.protection.chain import LawChain, compiled_law
 from rtsim.protection.laws import LawSpec
-from rtsim.protection.limits import load_limits
-from rtsim.units import to_deg
-from scenarios.campaign import trial_kernels as kernels
 
 if TYPE_CHECKING:
     from rtsim.command import Pilot
@@ -32,6 +29,8 @@ if TYPE_CHECKING:
 
 TRIAL_CORRIDOR: CorridorName = "flight"
 """Corridor of trials that name none: laws keep to it and flights are judged by it, with a law and without."""
+SLOW_CALLS = 10
+"""Calls of a law in one flight that last longer than its period and count as a failure; fewer are the machine's."""
 BUFFERED = ("reverse_margin", "pass_margin", "blend_begin", "blend_full")
 """Margins of the built-in laws that a buffer is added to."""
 
@@ -117,14 +116,17 @@ class Bench:
             rows = _fly_by_hand(simulation, pilot, self._rows[:frames])
         if chain is not None and repeat:
             chain.unrepeatable()
-        problems = () if chain is None else tuple(event.text for event in chain.events)
-        metrics = np.zeros(kernels.METRIC_COUNT)
-        limits = load_limits(parts.database.profile)
-        bounds = kernels.TrialLimits(float(to_deg(limits.flapping)), limits.torque, TORQUE_EXCESS)
-        kernels.measure_trial(rows, simulation.tables.programme, bounds, simulation.dt, metrics)
-        metrics[kernels.M_COMPLETED] = float(not simulation.finished)
-        metrics[kernels.M_YIELDED] = simulation.flying.state.script[S_YIELDED]
-        return TrialFlight(TrialMetrics(metrics), simulation.end_reason, rows.copy() if keep else rows, problems)
+        problems = () if chain is None else (*(event.text for event in chain.events), *_late(chain, law))
+        yielded = bool(simulation.flying.state.script[S_YIELDED])
+        numbers = measured(
+            rows,
+            setup.programme,
+            simulation.dt,
+            profile=parts.database.profile,
+            ended=simulation.finished,
+            yielded=yielded,
+        )
+        return TrialFlight(TrialMetrics(numbers), simulation.end_reason, rows.copy() if keep else rows, problems)
 
 
 def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
@@ -134,6 +136,15 @@ def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
         protection=law,
         corridor=plan.setup.options.corridor or TRIAL_CORRIDOR,
     )
+
+
+def _late(chain: LawChain, law: str | Sequence[LawSpec]) -> tuple[str, ...]:
+    """Laws that would be late in real time, as a sentence; it changes nothing of the flight."""
+    if chain.slow_calls < SLOW_CALLS:
+        return ()
+    names = law if isinstance(law, str) else ", ".join(spec.name for spec in law)
+    late = f"took longer than its period of {1000.0 * chain.period:.0f} ms in {chain.slow_calls} calls"
+    return (f"the law {names} {late}; in real time it would be late",)
 
 
 def _with_buffer(tables: SimulationTables, buffer: float) -> SimulationTables:

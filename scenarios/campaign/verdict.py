@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtsim.arrays import FloatArray
-from rtsim.measures.trial_metrics import METRIC_PLACE
+from rtsim.measures.metric_kernels import METRICS, VALUE
 from scenarios.campaign.chunks import LawVariant
 from scenarios.campaign.events import EVENTS
 from scenarios.campaign.spec import CampaignFile, ExpectRate
@@ -29,7 +29,7 @@ class Flights:
     laws: tuple[LawVariant, ...]
     """The laws; the last is ``off``."""
     metrics: tuple[FloatArray, ...]
-    """By class: metrics, shape (runs, laws, METRIC_COUNT)."""
+    """By class: metrics, shape (runs, laws, VALUE.size)."""
     planned: tuple[int, ...]
     """By class: runs of the whole campaign."""
 
@@ -190,37 +190,41 @@ def _rate(happened: FloatArray, flights: Flights) -> dict[str, Any]:
 
 
 def _law_summary(flights: Flights, place: int, seed: int) -> dict[str, Any]:
-    confidence = flights.spec.confidence
     events = {}
     for event in EVENTS:
         happened = flights.happened(event, place)
         events[event] = _rate(happened, flights)
     metrics = np.concatenate([values[:, place] for values in flights.metrics])
     off = np.concatenate([values[:, flights.off] for values in flights.metrics])
-    outside = metrics[metrics[:, METRIC_PLACE["exceedances"]] > 0.0]
-
-    def spread(values: FloatArray, share: float) -> dict[str, float]:
-        return asdict(quantile(values, share, seed=seed % 2**32 + BOOTSTRAP_SEED, confidence=confidence))
-
-    def column(name: str, values: FloatArray) -> FloatArray:
-        picked: FloatArray = values[:, METRIC_PLACE[name]]
-        return picked
-
-    lost = column("height_lost_m", metrics)
+    outside = metrics[:, VALUE.exceedances] > 0.0
+    found: dict[str, Any] = {}
+    for item in METRICS:
+        values = metrics[:, getattr(VALUE, item.name)]
+        statistics = {}
+        for words in item.campaign:
+            name, _, which = words.partition(" ")
+            statistics[name] = _statistic(name, values[outside] if which else values, flights, seed)
+        if statistics:
+            found[item.name] = statistics.get("rms", statistics)
+    beyond = metrics[:, VALUE.height_lost_m] - off[:, VALUE.height_lost_m]
     return {
         "law": flights.laws[place].label,
         "buffer_kt": flights.laws[place].buffer_kt,
         "flights": len(metrics),
         "events": events,
-        "depth_kt": {"p50": spread(column("depth_kt", outside), 0.5), "p95": spread(column("depth_kt", outside), 0.95)},
-        "time_outside_s": {"p50": spread(column("time_outside_s", outside), 0.5)},
-        "height_lost_m": {"p90": spread(lost, 0.9), "max": float(lost.max(initial=0.0))},
-        "height_lost_beyond_off_m": {"max": float((lost - column("height_lost_m", off)).max(initial=0.0))},
-        "flapping_peak_deg": {"max": float(column("flapping_peak_deg", metrics).max(initial=0.0))},
-        "torque_ratio_peak": {"max": float(column("torque_ratio_peak", metrics).max(initial=0.0))},
-        "stick_authority_rms": float(np.sqrt(np.mean(column("stick_authority_rms", metrics) ** 2))),
-        "lever_authority_rms": float(np.sqrt(np.mean(column("lever_authority_rms", metrics) ** 2))),
+        **found,
+        "height_lost_beyond_off_m": {"max": float(beyond.max(initial=0.0))},
     }
+
+
+def _statistic(name: str, values: FloatArray, flights: Flights, seed: int) -> Any:
+    """A statistic of a metric over flights: ``max``, ``rms``, or a quantile with its interval, such as ``p95``."""
+    if name == "max":
+        return float(values.max(initial=0.0))
+    if name == "rms":
+        return float(np.sqrt(np.mean(values**2)))
+    share, seed = int(name.removeprefix("p")) / 100.0, seed % 2**32 + BOOTSTRAP_SEED
+    return asdict(quantile(values, share, seed=seed, confidence=flights.spec.confidence))
 
 
 def _comparisons(flights: Flights) -> list[dict[str, Any]]:

@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
-from rtsim.measures.metrics import METRIC_NAMES
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
 from rtsim.strict import explain
 from rtsim.toml_file import named_text, parse_toml, shipped_names
@@ -120,6 +119,8 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     found += automatic_problems(content.automatic, given(content.flight).get("nacelle", ""), file)
     found += trial_problems(content.pulses, content.trial, has_events=bool(content.events), file=file)
     for number, clause in enumerate(content.expect):
+        from rtsim.measures.metrics import METRIC_NAMES  # loads compiled code
+
         key = f"expect[{number}]"
         if clause.metric not in METRIC_NAMES:
             found.append(

@@ -23,7 +23,7 @@ class TrialClause:
     name: str
     """What is expected, in words."""
     metric: str
-    """One of ``rtsim.measures.trial_metrics.TRIAL_METRICS``."""
+    """One of ``rtsim.measures.metrics.TRIAL_METRICS``."""
     of: Literal["law", "off", "difference"]
     """Whose value: the protected flight's, its twin's, or the first minus the second."""
     minimum: float | None
@@ -76,8 +76,6 @@ def trial_problems(
         trial: The test, or None.
         has_events: Whether the scenario hands the controls over.
     """
-    from rtsim.measures.trial_metrics import TRIAL_METRICS
-
     found = []
     for number, pulse in enumerate(pulses):
         largest = {"stick": LARGEST_STICK, "lever": LARGEST_LEVER}.get(pulse.channel, 12.0)
@@ -110,6 +108,8 @@ def trial_problems(
     if trial.kind == "nominal" and trial.off_leaves:
         found.append(InputError("contradicts kind nominal", file=file, key="trial.off_leaves", mend="delete it"))
     for number, clause in enumerate(trial.expect):
+        from rtsim.measures.metrics import TRIAL_METRICS  # loads compiled code
+
         key = f"trial.expect[{number}]"
         if clause.metric not in TRIAL_METRICS:
             found.append(

@@ -17,9 +17,9 @@ from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, WATCHED, load_levels
-from rtsim.protection.monitor import monitor_tables, sensors_of_rows
-from rtsim.protection.monitor_kernels import FAR, KIND_COUNT, LEVEL_STATE_SIZE, MonitorTables, watch
+from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
+from rtsim.protection.monitor import MarginWatch, monitor_tables, sensors_of_rows
+from rtsim.protection.monitor_kernels import KIND, LIMIT_WORDS, MonitorTables
 from telemetry.log.format import LogEvent
 
 BATCH_ROWS = 10
@@ -49,25 +49,18 @@ class LimitWatch:
             database: LPV database of the aircraft, a file; empty: the shipped XV-15.
         """
         aircraft = load_database(database or None)
-        self._tables = _tables(corridor_name, aircraft)
+        self._levels = MarginWatch(_tables(corridor_name, aircraft), load_levels(aircraft.profile), dt)
         self._dt, self._tell = dt, tell
         self._noted: list[LogEvent] = []
-        levels = load_levels(aircraft.profile)
-        self._scale, self._units, self._outside = levels.scale, levels.units, levels.threshold[:, 2]
         self._waiting = np.empty((BATCH_ROWS, SIGNAL_COUNT))
         self._fill = 0
         self._frame = -1
-        self._levels = np.zeros(LEVEL_STATE_SIZE)
-        self._told = np.zeros(KIND_COUNT)
-        self._worst = np.full(KIND_COUNT, np.inf)
-        self._outside_frames = np.zeros(KIND_COUNT, dtype=np.int64)
+        self._told = np.zeros(KIND.size)
         self._reasons: list[set[int]] = [{0}, {0}, {0}]  # of this episode, by channel; told once each
         self._began: int | None = None  # frame in which a law began to act; None: none acts
         self._acted = 0  # last frame in which it did
         self._episodes = 0
         self._active_frames = [0, 0, 0]
-        none = np.zeros((0, SIGNAL_COUNT))  # compiled or loaded now: the first rows come while the flight is on its way
-        self._look(none)
 
     def row(self, row: FloatArray) -> None:
         """Take one row of a paced flight.
@@ -108,40 +101,21 @@ class LimitWatch:
     def summary(self) -> dict[str, Any]:
         """Least margins and what the law did, as ``rtsim fly --json`` prints them."""
         self.flush()
-        limits = {
-            name: {
-                "worst_margin": float(self._worst[k] / self._scale[k]),
-                "unit": self._units[k],
-                "outside_s": int(self._outside_frames[k]) * self._dt,
-            }
-            for k, name in enumerate(WATCHED)
-            if self._worst[k] < FAR and name != "nacelle_range"
-        }
         seconds = {
             f"{name}_s": frames * self._dt for (name, _), frames in zip(_CHANNELS, self._active_frames, strict=True)
         }
-        return {"limits": limits, "interventions": {"episodes": self._episodes, **seconds}}
+        return {"limits": self._levels.summary(), "interventions": {"episodes": self._episodes, **seconds}}
 
     def _start_anew(self) -> None:
         """A reset begins a new flight, whose levels are all clear."""
-        self._levels[:] = 0.0
+        self._levels.reset()
         self._told[:] = 0.0
         self._reasons = [{0}, {0}, {0}]
         self._began = None
 
-    def _look(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Margins and levels of rows, each of shape (frames, KIND_COUNT)."""
-        frames = len(rows)
-        margins, levels = np.empty((frames, KIND_COUNT)), np.empty((frames, KIND_COUNT))
-        sensors = sensors_of_rows(rows)
-        ahead = np.ascontiguousarray(rows[:, COLUMN.time_to_limit_s])
-        watch(self._tables, sensors, ahead, self._dt, self._levels, margins, levels)
-        return margins, levels
-
     def _watch_limits(self, rows: FloatArray) -> None:
-        margins, levels = self._look(rows)
-        np.minimum(self._worst, margins.min(axis=0), out=self._worst)
-        self._outside_frames += np.count_nonzero(margins < self._outside, axis=0)
+        ahead = np.ascontiguousarray(rows[:, COLUMN.time_to_limit_s])
+        margins, levels = self._levels.look(sensors_of_rows(rows), ahead)
         told = np.where(levels >= TOLD_FROM, levels, 0.0)
         if not told.any() and not self._told.any():
             return
@@ -156,18 +130,19 @@ class LimitWatch:
         if name in _TOLD_ELSEWHERE or 0 < level < before:
             return
         words = LIMIT_WORDS[name]
-        margin /= float(self._scale[kind])
-        unit = f" {self._units[kind]}" if self._units[kind] else ""
+        margin /= float(self._levels.limits.scale[kind])
+        unit = self._levels.limits.units[kind]
+        shown = f" {unit}".rstrip()
         if level == 0:
             text = f"{words} clear again"
         elif name == "time_to_limit":
             side = "low" if row[COLUMN.margin_low_kt] < row[COLUMN.margin_high_kt] else "high"
             text = f"the corridor's {side}-speed side is {margin:.1f} s ahead as the controls are"
         elif margin >= 0.0:
-            text = f"{words} {LEVEL_NAMES[level]}: {margin:.1f}{unit} left"
+            text = f"{words} {LEVEL_NAMES[level]}: {margin:.1f}{shown} left"
         else:
-            text = f"{words} {LEVEL_NAMES[level]}: {-margin:.1f}{unit} beyond the limit"
-        data = {"limit": name, "level": level, "margin": margin, "unit": self._units[kind]}
+            text = f"{words} {LEVEL_NAMES[level]}: {-margin:.1f}{shown} beyond the limit"
+        data = {"limit": name, "level": level, "margin": margin, "unit": unit}
         self._say(row, "limit", text, "info" if level == 0 else LEVEL_NAMES[level], data)
 
     def _watch_protection(self, rows: FloatArray) -> None:

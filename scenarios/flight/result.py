@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from rtsim.arrays import FloatArray
@@ -122,7 +122,7 @@ class FlightRecord(Mapping[str, FloatArray]):
             "history_sha256": self.history_sha256,
             "database_sha256": self.database_hash,
         }
-        result.update(asdict(self.metrics) if self.metrics is not None else {})
+        result.update(self.metrics.asdict() if self.metrics is not None else {})
         result.update(self.watched)
         if self.mavlink is not None:
             result["mavlink"] = dict(self.mavlink)

@@ -251,7 +251,7 @@ def _fig14_similar_frequency(evidence: Evidence, limits: Limits) -> Finding:
 
 def _fig16_max_rate(evidence: Evidence, limits: Limits) -> Finding:
     flight = evidence.measures["centre_line_variable"]
-    rate, fast = flight.nacelle_rate_max_deg_s, flight.time_fast_s
+    rate, fast = flight.metrics.nacelle_deg.max_rate_deg_s, flight.time_fast_s
     holds = _near(rate, limits["rate_deg_s"], limits["tolerance_deg_s"]) and 0.0 < fast <= limits["time_fast_s"]
     return flight.completed and holds, {
         "rate_deg_s": rate,

@@ -12,7 +12,7 @@ from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.measures.metrics import FlightMetrics, flight_metrics
 from rtsim.optimization.paths import TABLE_1
-from rtsim.units import deg, kt, to_kt
+from rtsim.units import STICK_HALF_TRAVEL_IN, deg, kt, to_kt
 from scenarios.reproduction.flights import RATE_HZ, Flight
 
 SETTLED_S = 3.0
@@ -91,8 +91,6 @@ class FlightMeasures:
     """Root mean square of the stick's rate from 3 s on [in/s]."""
     lever_rate_per_s: float
     """Root mean square of the lever's rate from 3 s on [1/s]."""
-    nacelle_rate_max_deg_s: float
-    """Largest nacelle rate [deg/s]."""
     time_fast_s: float
     """Time with the nacelles faster than 8 deg/s [s]."""
     corridor_position: float
@@ -203,9 +201,8 @@ def measure(flight: Flight) -> FlightMeasures:
         tilt_acceleration_kt_s=_mean(acceleration[tilting]),
         stick_frequency_hz=_mean_frequency(flight["stick"][settled]),
         lever_frequency_hz=_mean_frequency(flight["lever"][settled]),
-        stick_rate_in_s=_rms(np.diff(flight["stick"][settled]) * RATE_HZ * 4.8),
+        stick_rate_in_s=_rms(np.diff(flight["stick"][settled]) * RATE_HZ * STICK_HALF_TRAVEL_IN),
         lever_rate_per_s=_rms(np.diff(flight["lever"][settled]) * RATE_HZ),
-        nacelle_rate_max_deg_s=float(np.abs(flight["nacelle_rate_deg_s"]).max()),
         time_fast_s=float(np.count_nonzero(np.abs(flight["nacelle_rate_deg_s"]) > FAST_RATE_DEG_S) / RATE_HZ),
         corridor_position=_corridor_position(flight),
         margin_flight_kt=_smallest_margin_kt(flight, "flight"),

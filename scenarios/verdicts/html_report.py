@@ -6,7 +6,7 @@ import html
 from collections.abc import Sequence
 
 import rtsim
-from rtsim.measures.trial_metrics import TRIAL_METRICS
+from rtsim.measures.metrics import TRIAL_METRICS
 from scenarios.verdicts.picture import interventions, picture
 from scenarios.verdicts.tester import Case
 

@@ -14,7 +14,8 @@ from rtsim.frame import COLUMN
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
-from rtsim.protection.limits import LIMIT_KINDS, LIMIT_WORDS, load_limits
+from rtsim.protection.limits import LIMIT_KINDS, load_limits
+from rtsim.protection.monitor_kernels import LIMIT_WORDS
 from rtsim.units import DEGREE, INCH_POUND, kt, to_deg, to_kt
 from scenarios.verdicts.tester import Case
 
@@ -210,7 +211,7 @@ def _draw_lanes(axes: Any, found: Sequence[dict[str, Any]]) -> None:
         axes.broken_barh(
             [(item["from_s"], max(item["to_s"] - item["from_s"], 0.02))],
             (names.index(item["channel"]) - 0.35, 0.7),
-            color=_REASON_COLOURS[place],
+            color=_REASON_COLOURS[place % len(_REASON_COLOURS)],
             label=None if limit in seen else LIMIT_WORDS.get(limit, "a limit of the law's own"),
         )
         seen.add(limit)

@@ -14,8 +14,7 @@ from rtsim.choices import HAND_PILOT
 from rtsim.frame import SIGNAL_COUNT, history_sha256
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
-from rtsim.measures.metrics import flight_metrics
-from rtsim.measures.trial_metrics import TrialMetrics
+from rtsim.measures.metrics import FlightMetrics, TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
 from scenarios.campaign.events import new_violations
 from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
@@ -190,7 +189,7 @@ class Tester:
             *_law_findings(flown),
             *_default_findings(trial, flown.metrics, off.metrics),
             *_clause_findings(trial, flown.metrics, off.metrics),
-            *_flight_findings(scenario, flown.rows),
+            *_flight_findings(scenario, FlightMetrics(flown.metrics.numbers)),
         ]
         return Case(
             scenario=scenario,
@@ -335,11 +334,8 @@ def _clause_findings(trial: Trial, law: TrialMetrics, off: TrialMetrics) -> list
     return found
 
 
-def _flight_findings(scenario: Scenario, rows: FloatArray) -> list[Finding]:
+def _flight_findings(scenario: Scenario, metrics: FlightMetrics) -> list[Finding]:
     """The scenario's ``[[expect]]`` clauses, of the protected flight."""
-    if not scenario.expectations:
-        return []
-    metrics = flight_metrics(rows, scenario.programme, 1.0 / scenario.options.rate_hz)
     found = []
     for clause in scenario.expectations:
         value = metrics.value(clause.metric)

@@ -12,7 +12,7 @@ import pytest
 from rtsim.command import Command
 from rtsim.frame import COLUMN
 from rtsim.loop.simulation import FlightSetup, Simulation
-from rtsim.measures.figures import figures_of_rows
+from rtsim.measures.metrics import FlightFigures, measured
 from rtsim.nacelle.automatic import AutomaticNacelle, ScheduledNacelle, centre_line_schedule
 from rtsim.optimization.batch import BatchFlyer
 from rtsim.optimization.paths import table_1
@@ -92,7 +92,7 @@ def test_steps_runs_batches_and_snapshots_agree(automatic_flight):
     simulation.restore(snapshot)
     assert np.array_equal(simulation.run(len(rest)), rest)
     batch = BatchFlyer(setup, workers=1).fly([setup.programme])[0]
-    assert batch == figures_of_rows(record.rows, simulation.dt)
+    assert batch == FlightFigures(measured(record.rows, setup.programme, simulation.dt))
 
 
 def test_the_law_sets_the_nacelles_whoever_flies():

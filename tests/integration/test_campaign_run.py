@@ -107,7 +107,7 @@ def test_a_run_does_not_depend_on_what_was_flown_before_it(alone):
     bench = Bench()
     for law, place in (("full", 0), ("governor", 1), ("off", 2)):
         flight = bench.fly(draw_plan(spec, seed=0, class_number=1, run=13), law)
-        np.testing.assert_array_equal(flight.metrics.values, alone.flights.metrics[1][13, place])
+        np.testing.assert_array_equal(flight.metrics.numbers, alone.flights.metrics[1][13, place])
 
 
 def test_another_seed_is_another_campaign(alone):

@@ -10,7 +10,8 @@ import pytest
 from rtsim.analysis.path_stability import path_stability
 from rtsim.errors import InputError
 from rtsim.loop.simulation import Simulation
-from rtsim.measures.figures import figures_of_rows, objective_value
+from rtsim.measures.metric_kernels import VALUE
+from rtsim.measures.metrics import FlightFigures, measured, objective_value
 from rtsim.optimization.paths import fast_side, paper_path, table_1
 from rtsim.optimization.problem import CONSTRAINTS, ConversionProblem
 from rtsim.optimization.report import baseline_summary, best_path, nonlinear_check, scenario_text
@@ -61,6 +62,14 @@ def test_every_vector_of_the_box_is_a_conversion(problem):
         assert (speeds[0], angles[0], speeds[-1], angles[-1]) == (0.0, 90.0, 170.0, 0.0)
 
 
+def with_changes(figures, changes):
+    """The same flight with some of its figures replaced, by name."""
+    numbers = figures.numbers.copy()
+    for name, value in changes.items():
+        numbers[getattr(VALUE, FlightFigures.shown[name].name)] = value
+    return FlightFigures(numbers)
+
+
 def test_limits_that_are_broken_count(problem):
     path = paper_path("typical")
     figures = problem.fly([path])[0][0]
@@ -78,7 +87,7 @@ def test_limits_that_are_broken_count(problem):
         "arrival": {"airspeed_final_kt": 167.0},
     }
     for name, change in changes.items():
-        worse, broken = problem.worth(path, [dataclasses.replace(figures, **change)])
+        worse, broken = problem.worth(path, [with_changes(figures, change)])
         assert [CONSTRAINTS[k] for k, value in enumerate(broken) if value > 0.0] == [name]
         assert worse[0] > 1e6 if name == "completed" else worse == objectives
     tight = problem_of(limits={"duration_s": 60.0, "mast_torque_inlb": 1000.0})
@@ -120,12 +129,18 @@ def test_the_winner_flies_again_with_the_same_figures_to_the_last_bit(problem, f
     assert record.completed
     assert record.metrics is not None
     assert record.metrics.flapping_deg.integral_deg_s == found.objectives[0]
-    assert figures_of_rows(record.rows, 1.0 / scenario.options.rate_hz) == problem.fly([path])[0][0]
+    assert (
+        FlightFigures(measured(record.rows, scenario.programme, 1.0 / scenario.options.rate_hz))
+        == problem.fly([path])[0][0]
+    )
     assert all(verdict.held for verdict in record.verdicts)
     # The same flight by hand.
     simulation = Simulation(dataclasses.replace(problem.setup, programme=path.programme()))
     rows = simulation.run(len(record.rows))
-    assert objective_value(figures_of_rows(rows, simulation.dt), "flapping_integral") == found.objectives[0]
+    assert (
+        objective_value(FlightFigures(measured(rows, path.programme(), simulation.dt)), "flapping_integral")
+        == found.objectives[0]
+    )
 
 
 def test_the_nonlinear_model_flies_the_winner(problem, found):

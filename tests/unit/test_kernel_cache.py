@@ -30,7 +30,7 @@ def sources(tmp_path):
 def test_an_edit_of_any_kernel_or_constant_changes_the_folder(sources):
     before = kernel_cache.source_hash(sources)
     assert before == kernel_cache.source_hash(ROOT)
-    for name in ("rtsim/protection/limiter_kernels.py", "scenarios/campaign/trial_kernels.py", "rtsim/units.py"):
+    for name in ("rtsim/protection/limiter_kernels.py", "rtsim/measures/metric_kernels.py", "rtsim/units.py"):
         path = sources / name
         text = path.read_text(encoding="utf-8")
         path.write_text(text + "# edited\n", encoding="utf-8")

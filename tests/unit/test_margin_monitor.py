@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rtsim.aircraft.profile import xv15_profile
 from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
-from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
-from rtsim.protection.monitor import MarginHistory, MarginMonitor, sensor_array, sensors_of_rows, severity
+from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limits
+from rtsim.protection.monitor import MarginHistory, MarginMonitor, MarginWatch, sensor_array, sensors_of_rows
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
+ROOT = Path(__file__).resolve().parents[2]
 CALM = Sensors(
     time=0.0, airspeed=kt(105.0), airspeed_rate=0.0, nacelle_angle=deg(50.0), nacelle_rate=0.0, pitch=0.0,
     pitch_rate=0.0, flight_path_angle=0.0, altitude=100.0, climb_rate=0.0, load_factor=1.0,
@@ -164,11 +171,11 @@ def test_history_equals_the_monitor_in_flight(monitor):
         names = ("clear", "caution", "warning", "exceedance")
         assert list(got.levels.values()) == [names[int(level)] for level in history.levels[k]]
         assert got.normalized_distance == history.normalized_distance[k]
-    assert history.summary()["stall_attitude"]["worst"] == pytest.approx(
+    assert history.limits["stall_attitude"]["worst_margin"] == pytest.approx(
         85.0 - to_kt(load_corridor("flight").low_speed(deg(50.0)))
     )
-    assert history.summary()["stall_attitude"]["outside_s"] > 0.5
-    assert history.summary()["stall_attitude"]["level"] == 3.0
+    assert history.limits["stall_attitude"]["outside_s"] > 0.5
+    assert history.levels[:, kernels.KIND.stall_attitude].max() == 3.0
 
 
 def test_sensor_values_keep_the_order_of_the_sensors():
@@ -181,24 +188,94 @@ def test_sensor_values_keep_the_order_of_the_sensors():
 
 def test_watched_names_are_the_limits_and_the_time():
     assert WATCHED[: len(LIMIT_KINDS)] == LIMIT_KINDS
-    assert len(WATCHED) == kernels.KIND_COUNT
+    assert len(WATCHED) == kernels.KIND.size
 
 
-@pytest.mark.parametrize(
-    ("depth", "duration", "lost", "word"),
-    [(-1.0, 0.0, False, "none"), (3.0, 1.0, False, "minor"), (3.0, 2.5, False, "major"), (7.0, 1.0, False, "major"),
-     (15.1, 0.2, False, "critical"), (0.0, 0.0, True, "critical")],
-)  # fmt: skip
-def test_severity(depth, duration, lost, word):
-    assert severity(kt(depth), duration, lost=lost) == word
+def test_limits_are_the_numbers_of_the_data_in_si():
+    limits, data = load_limits(), xv15_profile().protection.data["limits"]
+    assert to_deg(limits.flapping) == pytest.approx(data["flapping_deg"])
+    assert to_deg(limits.nacelle_rate) == pytest.approx(data["nacelle_rate_deg_s"])
+    assert to_kt(limits.plant_guard) == pytest.approx(data["plant_guard_kt"])
+    assert limits.load_factor_min == data["load_factor_min"]
+    assert limits.torque.takeoff == pytest.approx(data["mast_torque_takeoff_inlb"] * INCH_POUND)
+    assert (limits.sink.floor, limits.sink.time) == (data["sink_rate_m_s"], data["sink_time_s"])
+
+
+def test_what_is_watched_in_pieces_is_watched_as_a_whole(monitor):
+    """Levels and least margins do not depend on how many rows are looked at together."""
+    random = np.random.default_rng(2)
+    sensors = np.tile(sensor_array(CALM), (900, 1))
+    sensors[:, SENSOR.flapping] = deg(10.0 + 3.0 * np.sin(np.arange(900) / 90.0))
+    sensors[:, SENSOR.load_factor] = 1.0 + random.standard_normal(900)
+    ahead = np.full(900, 6.0)
+    whole, pieces = (MarginWatch(monitor.tables, load_levels(), 0.004) for _ in range(2))
+    margins, levels = whole.look(sensors, ahead)
+    parts = [pieces.look(sensors[k : k + 7], ahead[k : k + 7]) for k in range(0, 900, 7)]
+    assert np.array_equal(np.concatenate([part[0] for part in parts]), margins)
+    assert np.array_equal(np.concatenate([part[1] for part in parts]), levels)
+    assert levels[:, kernels.KIND.flap_stop].max() == 3.0
+    found = whole.summary()
+    assert found == pieces.summary()
+    assert found["flap_stop"]["worst_margin"] == pytest.approx(-1.0, abs=1e-3)
+    assert found["flap_stop"]["outside_s"] == np.count_nonzero(margins[:, kernels.KIND.flap_stop] < 0.0) * 0.004
+    assert "downstop_gate" not in found
+
+
+TOY = """
+import importlib.util, json, sys
+import numpy as np
+from rtsim.aircraft.profile import xv15_profile
+
+spec = importlib.util.spec_from_file_location("rtsim.protection.monitor_kernels", sys.argv[1])
+module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+data = xv15_profile().protection.data
+data["limits"]["climb_m_s"] = 9.0
+data["levels"]["climb"] = {"unit": "m/s", "threshold": [2.0, 1.0, 0.0], "hysteresis": 0.5}
+
+from rtsim.command import SENSOR
+from rtsim.lpv.files.storage import load_database
+from rtsim.protection.limits import LIMIT_KINDS, load_levels, load_limits
+from rtsim.protection.monitor import MarginWatch, monitor_tables
+
+watch = MarginWatch(monitor_tables("flight", load_database()), load_levels(), 0.1)
+sensors = np.zeros((4, SENSOR.size))
+sensors[:, SENSOR.climb_rate] = [1.0, 8.5, 8.5, 9.5]
+margins, levels = watch.look(sensors, np.full(4, 6.0))
+place = LIMIT_KINDS.index("climb")
+print(json.dumps([watch.summary()["climb"], levels[:, place].tolist(), load_limits().climb, place]))
+"""
+
+
+def test_a_new_limit_needs_the_kernel_and_the_data_alone(tmp_path):
+    """A toy limit has its margin, level, unit and number wherever limits are."""
+    text = (ROOT / "rtsim/protection/monitor_kernels.py").read_text(encoding="utf-8")
+    for place, line in (
+        ('    "sink": "sink rate",\n', '    "climb": "climb rate",\n'),
+        ("LIMIT_NUMBERS = {\n", '    "climb": ("climb_m_s", 0.0, 100.0),\n'),
+        (
+            "    nz = sensors[SENSOR.load_factor]\n",
+            "    out[KIND.climb] = numbers[LIMIT.climb] - sensors[SENSOR.climb_rate]\n",
+        ),
+    ):
+        assert text.count(place) == 1
+        text = text.replace(place, place + line)
+    (tmp_path / "monitor_kernels.py").write_text(text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", TOY, str(tmp_path / "monitor_kernels.py")]
+    ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, env=environment, check=False)
+    assert ended.returncode == 0, ended.stderr
+    found, levels, number, place = json.loads(ended.stdout)
+    assert found == {"worst_margin": -0.5, "unit": "m/s", "outside_s": 0.1}
+    assert (levels, number, place) == ([0.0, 2.0, 2.0, 3.0], 9.0, len(LIMIT_KINDS))
 
 
 def history_of(margin, predicted):
     time = 0.1 * np.arange(len(margin))
-    margins = np.full((len(margin), kernels.KIND_COUNT), 10.0)
-    margins[:, kernels.KIND_STALL] = margin
+    margins = np.full((len(margin), kernels.KIND.size), 10.0)
+    margins[:, kernels.KIND.stall_attitude] = margin
     zeros = np.zeros(len(margin))
-    return MarginHistory(time, margins, margins * 0.0, zeros, np.asarray(predicted, float), zeros, load_levels())
+    return MarginHistory(time, margins, margins * 0.0, zeros, np.asarray(predicted, float), zeros)
 
 
 def test_assessment_of_a_perfect_and_of_a_late_prediction():

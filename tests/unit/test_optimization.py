@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtsim.errors import InputError, OutputError
-from rtsim.measures.figures import OBJECTIVES
+from rtsim.measures.metrics import OBJECTIVES
 from rtsim.optimization.methods import (
     Penalty,
     feasibility_order,
