@@ -248,11 +248,7 @@ def _turn_systems(flight: Flight) -> None:
 
 @inner_kernel
 def move_reference(flight: Flight) -> None:
-    """Move the filtered airspeed reference and the frame number on.
-
-    Args:
-        flight: The flight.
-    """
+    """Move the filtered airspeed reference and the frame number on."""
     tables, state, dt = flight.tables, flight.state, flight.tables.dt
     time = state.clock[CLOCK.frame] * dt
     wanted = programme_at(tables.programme, PROGRAMME.airspeed, time)
@@ -272,11 +268,7 @@ def move_reference(flight: Flight) -> None:
 
 @inner_kernel
 def faults_act(flight: Flight) -> bool:
-    """Whether this flight has failures, scheduled or thrown in.
-
-    Args:
-        flight: The flight.
-    """
+    """Whether this flight has failures, scheduled or thrown in."""
     return flight.tables.faults.schedule.shape[0] > 0 or flight.state.clock[CLOCK.faults] != 0.0
 
 

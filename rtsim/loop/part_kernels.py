@@ -98,7 +98,6 @@ def move_air(flight: Flight, elapsed: float, normals: FloatArray) -> float:
     """Move gusts and turbulence on.
 
     Args:
-        flight: The flight.
         elapsed: Length of the frame before [s].
         normals: Standard normals of the turbulence.
     """

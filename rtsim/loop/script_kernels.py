@@ -86,7 +86,6 @@ def warns(shown: FloatArray, row: FloatArray) -> bool:
 
     Args:
         shown: What the airspeed indicator shows, then the margins that go with it [m/s].
-        row: The frame's row.
     """
     warned = min(shown[1], shown[2]) < WARNING_MARGIN
     warned = warned or row[COLUMN.protection_stick_reason] != 0.0

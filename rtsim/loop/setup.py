@@ -140,9 +140,6 @@ def start_trim(nonlinear: bool, database: Database, airspeed: float, nacelle: fl
 
     Args:
         nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
-        database: The LPV aircraft.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
 
     Raises:
         InputError: There is no trim.

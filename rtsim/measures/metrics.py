@@ -172,11 +172,7 @@ def objective_value(figures: FlightFigures, objective: str) -> float:
 
 
 def new_sums(profile: AircraftProfile | None = None) -> FloatArray:
-    """What a flight is measured into: nothing summed up yet, the limits it is judged by in their places.
-
-    Args:
-        profile: The aircraft; None: the XV-15.
-    """
+    """What a flight is measured into: nothing summed up yet, the limits it is judged by in their places."""
     limits, sums = load_limits(profile), np.zeros(SUM.size)
     sums[SUM.flapping_limit], sums[SUM.pitch_limit] = to_deg(limits.flapping), to_deg(limits.pitch)
     sums[SUM.load_limit_max], sums[SUM.load_limit_min] = limits.load_factor_max, limits.load_factor_min
@@ -189,7 +185,6 @@ def finished(sums: FloatArray, dt: float) -> FloatArray:
 
     Args:
         sums: What was summed up, places ``SUM``.
-        dt: Length of a frame [s].
 
     Raises:
         InputError: Not one frame was flown.
@@ -220,8 +215,6 @@ def measured(
     Args:
         rows: The frame history, shape (frames, SIGNAL_COUNT), at least one frame.
         programme: What it was asked to do.
-        dt: Length of a frame [s].
-        profile: The aircraft; None: the XV-15.
         ended: It ended by itself.
         yielded: Its pilot gave up his plan.
 
@@ -241,7 +234,6 @@ def flight_metrics(rows: FloatArray, programme: Programme, dt: float) -> FlightM
     Args:
         rows: The frame history, shape (frames, SIGNAL_COUNT), at least one frame.
         programme: What the scenario asked for.
-        dt: Length of a frame [s].
     """
     return FlightMetrics(measured(rows, programme, dt))
 

@@ -45,7 +45,6 @@ class LimitWatch:
         Args:
             corridor_name: Corridor that is watched.
             tell: Told every event.
-            dt: Length of a frame [s].
             database: LPV database of the aircraft, a file; empty: the shipped XV-15.
         """
         aircraft = load_database(database or None)
@@ -82,11 +81,7 @@ class LimitWatch:
             self.rows(rows)
 
     def rows(self, rows: FloatArray) -> None:
-        """Look at consecutive rows.
-
-        Args:
-            rows: The frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Look at consecutive rows."""
         if not len(rows):
             return
         if rows[0, COLUMN.frame] <= self._frame:

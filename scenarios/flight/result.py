@@ -141,7 +141,6 @@ def judge(
     """Judge a flight by its scenario's expectations; being completed is the first of them.
 
     Args:
-        scenario: What was flown.
         metrics: What was measured.
         completed: Whether it was flown to its end.
         end_reason: Why it ended.

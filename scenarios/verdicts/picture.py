@@ -48,9 +48,6 @@ def reason_name(reason: float) -> str:
 def interventions(rows: FloatArray) -> list[dict[str, Any]]:
     """When a law acted, on which channel and why; pauses shorter than 0.5 s do not part what belongs together.
 
-    Args:
-        rows: Frame rows.
-
     Returns:
         By channel and reason: ``channel, limit, from_s, to_s``.
     """

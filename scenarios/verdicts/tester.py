@@ -232,11 +232,7 @@ class Tester:
 
 
 def plan_of(scenario: Scenario) -> FlightPlan:
-    """The flight of a scenario, without a law.
-
-    Args:
-        scenario: The scenario.
-    """
+    """The flight of a scenario, without a law."""
     return FlightPlan(flight_setup(scenario), scenario.duration)
 
 
@@ -246,11 +242,7 @@ def _judged(scenario: Scenario) -> Scenario:
 
 
 def is_test(scenario: Scenario) -> bool:
-    """Whether a scenario can be flown and judged without a person.
-
-    Args:
-        scenario: The scenario.
-    """
+    """Whether a scenario can be flown and judged without a person."""
     judged = scenario.trial is not None or bool(scenario.expectations)
     return judged and scenario.options.pilot != HAND_PILOT
 
@@ -259,7 +251,6 @@ def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
     """A scenario that could not be flown.
 
     Args:
-        scenario: The scenario.
         law: Law that was asked for; None: the scenario's own.
         problem: What kept it from being flown.
     """
