@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class AskedCondition:
     """A flight condition as asked for on the command line, in the units of the options."""
 
     airspeed_kt: float
@@ -115,7 +115,7 @@ def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
     ]
 
 
-def checked(request: Request) -> Request:
+def checked(request: AskedCondition) -> AskedCondition:
     """Refuse values out of range.
 
     Returns:
@@ -164,7 +164,7 @@ def checked_outer_loop(outer_loop: str) -> OuterLoop:
     )
 
 
-def _condition(request: Request) -> Condition:
+def _condition(request: AskedCondition) -> Condition:
     from rtsim.aircraft.points import Condition
     from rtsim.units import deg, kt, lb, rpm
 
@@ -179,7 +179,7 @@ def _condition(request: Request) -> Condition:
     )
 
 
-def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
+def nonlinear_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     """Trim the nonlinear model at the condition.
 
     Returns:
@@ -204,7 +204,7 @@ def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     return _trim_result(request, xv15_profile(), values, configuration, point.converged), point
 
 
-def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
+def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     """Trim the LPV aircraft.
 
     Returns:
@@ -225,7 +225,7 @@ def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     return _trim_result(request, database.profile, values, configuration, point.converged), point
 
 
-def solvable(request: Request) -> Request:
+def solvable(request: AskedCondition) -> AskedCondition:
     """Ask the nonlinear model where the shipped database has no answer: beside its edge there may be a trim.
 
     Returns:
@@ -252,7 +252,7 @@ def solvable(request: Request) -> Request:
     return dataclasses.replace(request, nonlinear=True)
 
 
-def _lpv(request: Request) -> LpvAircraft:
+def _lpv(request: AskedCondition) -> LpvAircraft:
     from rtsim.lpv.aircraft import load_aircraft
 
     return load_aircraft(request.database)
@@ -271,7 +271,7 @@ def _named(
 
 
 def _trim_result(
-    request: Request,
+    request: AskedCondition,
     profile: AircraftProfile,
     values: dict[str, float],
     configuration: tuple[float, float],
@@ -319,7 +319,7 @@ def _beyond_limits(solved: dict[str, float], profile: AircraftProfile) -> list[s
     return found
 
 
-def no_trim(request: Request, point: TrimPoint) -> TrimError:
+def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
     """Say that there is no trim, and what did not close.
 
     Args:
@@ -336,7 +336,7 @@ def no_trim(request: Request, point: TrimPoint) -> TrimError:
     return TrimError(f"there is no level-flight trim at {where}{left}", mend=mend)
 
 
-def nonlinear_model(request: Request) -> dict[str, Any]:
+def nonlinear_model(request: AskedCondition) -> dict[str, Any]:
     """Linearize the nonlinear model at the condition.
 
     Returns:
@@ -357,7 +357,7 @@ def nonlinear_model(request: Request) -> dict[str, Any]:
     return _model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
 
 
-def database_model(request: Request) -> dict[str, Any]:
+def database_model(request: AskedCondition) -> dict[str, Any]:
     """Take the linear model from the database.
 
     Returns:
@@ -377,7 +377,7 @@ def database_model(request: Request) -> dict[str, Any]:
     return _model_result((database.states, database.inputs, database.outputs), matrices)
 
 
-def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
+def closed_loop_model(request: AskedCondition, outer_loop: str) -> dict[str, Any]:
     """Linearize the loop of aircraft and pilot, frozen at the condition and sampled as flown.
 
     Args:
@@ -392,8 +392,7 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
     """
     import numpy as np
 
-    from rtsim.analysis.frozen_loop import Condition as Command
-    from rtsim.analysis.frozen_loop import frozen_loop
+    from rtsim.analysis.frozen_loop import FrozenCommand, frozen_loop
     from rtsim.units import deg, kt
 
     if request.solves_nonlinear:
@@ -417,7 +416,7 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
             allowed=", ".join(database.pilot) or "none",
             mend="run 'rtsim model build'",
         )
-    loop = frozen_loop(database, Command(airspeed, nacelle), outer_loop=chosen)
+    loop = frozen_loop(database, FrozenCommand(airspeed, nacelle), outer_loop=chosen)
     matrix = loop.matrix
     pilot_states = matrix.shape[0] - len(database.states)
     names = [variable.name for variable in database.states] + [f"pilot_{k}" for k in range(pilot_states)]

@@ -86,7 +86,7 @@ class FrozenLoop:
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class FrozenCommand:
     """A frozen command. SI and radians."""
 
     airspeed: float
@@ -102,7 +102,9 @@ class Condition:
 class _Frame:
     """The two halves of one frame as functions of flat states, allocated once."""
 
-    def __init__(self, database: Database, lpv: LpvTables, pilot: PilotTables, condition: Condition, dt: float) -> None:
+    def __init__(
+        self, database: Database, lpv: LpvTables, pilot: PilotTables, condition: FrozenCommand, dt: float
+    ) -> None:
         self.lpv, self.pilot, self.dt = lpv, pilot, dt
         self.nacelle = condition.nacelle_angle
         self.reference = np.array([condition.airspeed, condition.acceleration, condition.altitude, 0.0, 0.0])
@@ -141,7 +143,7 @@ def _jacobian(function: Callable[[FloatArray], FloatArray], at: FloatArray, step
     return np.array(columns).T
 
 
-def _trim_state(database: Database, condition: Condition) -> tuple[FloatArray, FloatArray]:
+def _trim_state(database: Database, condition: FrozenCommand) -> tuple[FloatArray, FloatArray]:
     """Interpolated trim state and controls of the condition."""
     level = database.level_layer
     layers = database.layer_acceleration
@@ -165,7 +167,7 @@ def _trim_state(database: Database, condition: Condition) -> tuple[FloatArray, F
 
 def frozen_loop(
     database: Database,
-    condition: Condition,
+    condition: FrozenCommand,
     *,
     outer_loop: OuterLoop = "integrators",
     dt: float = 0.004,
@@ -257,6 +259,6 @@ def stability_map(
     growth = np.full(valid.shape, np.nan)
     acceleration = float(database.layer_acceleration[number])
     for i, j in np.argwhere(valid):
-        condition = Condition(float(v[i]), float(n[j]), acceleration)
+        condition = FrozenCommand(float(v[i]), float(n[j]), acceleration)
         growth[i, j] = frozen_loop(database, condition, dt=dt, tables=chosen).growth()
     return StabilityMap(airspeed=v, nacelle=n, growth=growth)

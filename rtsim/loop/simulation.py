@@ -125,11 +125,6 @@ class Simulation:
         """Hash of the aircraft: of the LPV database and, where it has one of its own, of its profile."""
         return self._parts.database_hash
 
-    @property
-    def outside_grid(self) -> int:
-        """Flags of the last LPV step: 0 inside the grid, else bits as in ``rtsim.lpv.lpv_kernels``."""
-        return int(self._state.clock[CLOCK.flags])
-
     def warm_up(self) -> None:
         """Compile or load what the coming frames need; the state stays untouched."""
         snapshot = self.snapshot()

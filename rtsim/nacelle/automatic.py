@@ -23,7 +23,7 @@ from rtsim.nacelle.automatic_kernels import (
 )
 from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.programme import Programme
-from rtsim.units import deg, kt, to_deg
+from rtsim.units import deg, to_deg
 
 NOMINAL_RATE = deg(7.5)
 """Rate of the XV-15's conversion actuators [rad/s] (TM 81244)."""
@@ -191,16 +191,6 @@ class ScheduledNacelle:
         return rate
 
 
-class Table1Nacelle(ScheduledNacelle):
-    """The plug-in law along the corners of the paper's Table 1, at the nominal rate."""
-
-    def __init__(self) -> None:
-        """Begin at rest."""
-        corners = ((0, 90), (24, 82), (40, 82), (61, 75), (80, 75), (105, 50), (130, 50), (150, 0))
-        schedule = NacelleSchedule(tuple(kt(v) for v, _ in corners), tuple(deg(n) for _, n in corners))
-        super().__init__(AutomaticNacelle(schedule))
-
-
 def _array(values: tuple[float, ...]) -> FloatArray:
     array = np.array(values, dtype=np.float64)
     array.flags.writeable = False
@@ -212,7 +202,6 @@ __all__ = [
     "AutomaticNacelle",
     "NacelleSchedule",
     "ScheduledNacelle",
-    "Table1Nacelle",
     "centre_line_schedule",
     "inactive_tables",
     "programme_schedule",

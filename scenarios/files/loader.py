@@ -15,8 +15,9 @@ from rtsim.strict import explain
 from rtsim.toml_file import named_text, parse_toml, shipped_names
 from rtsim.units import deg, kt
 from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
+from scenarios.files.expectation import Expectation
 from scenarios.files.nacelle_laws import automatic_problems, automatic_settings
-from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
+from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Scenario, ScenarioEvent
 from scenarios.files.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
 from scenarios.files.trial import pulses_of, trial_of, trial_problems
 
