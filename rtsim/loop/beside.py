@@ -22,6 +22,7 @@ CHILD = "RTSIM_COMPILES_BESIDE"
 """Set in the environment of the process beside."""
 KERNELS_ALONE, KERNELS_BESIDE = 107, 69
 """Kernels that a first flight of the LPV aircraft compiles: alone, and with a process beside it."""
+_wanted: list[str] = []
 _running: list[subprocess.Popen[bytes]] = []
 
 
@@ -34,6 +35,16 @@ def marker(plant: str) -> Path | None:
     configuration: Any = numba.config  # its names are made at run time
     folder = configuration.CACHE_DIR
     return Path(folder) / f"compiled-{plant}" if folder and not configuration.DISABLE_JIT else None
+
+
+def also(compile_it: str) -> None:
+    """Have the process beside call a function that compiles what is needed after the flight.
+
+    Args:
+        compile_it: ``MODULE:FUNCTION``; this room does not know those above it.
+    """
+    if compile_it not in _wanted:
+        _wanted.append(compile_it)
 
 
 def start(plant: str) -> None:
@@ -54,7 +65,7 @@ def start(plant: str) -> None:
     with contextlib.suppress(OSError):  # then the flight compiles all of it
         _running.append(
             subprocess.Popen(
-                [sys.executable, "-m", "rtsim.loop.compile_beside"],
+                [sys.executable, "-m", "rtsim.loop.compile_beside", *_wanted],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,

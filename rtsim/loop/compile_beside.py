@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import sys
 
 import numpy as np
 
@@ -24,6 +26,9 @@ def main() -> None:
     for name in ("ask", "advance", "decide"):
         load_part(flight, name, nonlinear=False)
     compile_watch()
+    for name in sys.argv[1:]:
+        module, _, function = name.partition(":")
+        getattr(importlib.import_module(module), function)()
 
 
 if __name__ == "__main__":

@@ -5,8 +5,9 @@ All are views of one array of numbers (``rtsim.measures.metric_kernels``), which
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -15,6 +16,8 @@ import numpy as np
 from rtsim.aircraft.profile import AircraftProfile
 from rtsim.arrays import BoolArray, FloatArray
 from rtsim.errors import InputError
+from rtsim.frame import SIGNAL_COUNT
+from rtsim.kernels.parts import entry_point
 from rtsim.measures import metric_kernels as kernels
 from rtsim.measures.metric_kernels import CONTROL, FLIGHT, METRICS, SEARCH, SUM, TRIAL, VALUE, Metric
 from rtsim.places import Places
@@ -201,6 +204,17 @@ def _named(values: FloatArray, places: Places) -> dict[str, float]:
     return {name: float(values[place]) for name, place in places.asdict().items()}
 
 
+@functools.cache
+def _measure_rows() -> Callable[..., float]:
+    """The compiled measuring of rows, held."""
+    return entry_point(kernels.measure_rows, np.zeros((1, SIGNAL_COUNT)), np.zeros((4, 1)), 0.0, np.zeros(1))
+
+
+def compile_measures() -> None:
+    """Compile, or load, what measures rows: a first flight does it beside."""
+    _measure_rows()
+
+
 def measured(
     rows: FloatArray,
     programme: Programme,
@@ -223,7 +237,7 @@ def measured(
     """
     sums = new_sums(profile)
     points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
-    kernels.measure_rows(np.require(rows, requirements=("C", "W")), points, dt, sums)
+    _measure_rows()(np.require(rows, np.float64, ("C", "W")), points, dt, sums)
     sums[SUM.ended], sums[SUM.yielded] = ended, yielded
     return finished(sums, dt)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
 from rtsim.frame import history_sha256
+from rtsim.loop import beside
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.metrics import flight_metrics
 from rtsim.realtime.control import FlightControl, checked_speed
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from telemetry.view.options import ViewOptions
     from telemetry.view.view import RerunView
 
+beside.also("rtsim.measures.metrics:compile_measures")
 TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "advice", "end"})
 """Events that ground stations are told of as text."""
 VIEW_PATIENCE_S = 1.5
