@@ -1,74 +1,35 @@
 """rtsim: a real-time, pilot-in-the-loop simulator of the Bell XV-15 tiltrotor.
 
-The names below are loaded when first used, so that importing the package costs nothing.
+Its names (``__init__.pyi``) are loaded when first used, so that importing the package costs nothing.
+
+Words that mean the same in every module; a function says only what is special about its own:
+
+Legend:
+    airspeed: Airspeed, horizontal and signed [m/s].
+    altitude: Height above the ground [m].
+    app: The ``rtsim`` command.
+    condition: The flight condition.
+    database: An LPV database in memory: trims, linear models, pilot gains.
+    dt: Length of a frame [s].
+    file: The file that a text or table came from, for messages.
+    flight: The flight.
+    nacelle: Nacelle angle, as ``nacelle_angle``.
+    nacelle_angle: Nacelle angle, pi/2 helicopter, 0 airplane [rad].
+    now: Monotonic time [s].
+    profile: The aircraft; None: the XV-15.
+    row: A frame's signals, shape (SIGNAL_COUNT,).
+    rows: Frames one after the other, shape (frames, SIGNAL_COUNT).
+    scenario: What is flown.
+    sensors: What pilots and laws may know of the aircraft, shape (SENSOR.size,) where it is an array.
+    state: What a part keeps from frame to frame.
+    tables: What a part reads: prepared once, never written.
+    timing: Wall-clock columns of the frame before, shape (TIMING_COUNT,); None where the flight is not paced.
+    u: The aircraft's inputs (nu,).
+    x: The aircraft's state (nx,).
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from rtsim.lazy import names_of
 
 __version__ = "0.1.0"
 
-if TYPE_CHECKING:
-    from rtsim.aircraft.xv15.model import Xv15
-    from rtsim.command import Command, Margins, Reference, Sensors
-    from rtsim.corridor import Corridor, load_corridor
-    from rtsim.errors import InputError, RtsimError
-    from rtsim.loop.options import FlightOptions
-    from rtsim.loop.simulation import FlightSetup, Simulation
-    from rtsim.lpv.aircraft import LpvAircraft, load_aircraft
-    from rtsim.pilot import MocmError, design_mocm
-    from rtsim.programme import Programme
-
-_HOME = {
-    "Command": "rtsim.command",
-    "Corridor": "rtsim.corridor",
-    "FlightOptions": "rtsim.loop.options",
-    "FlightSetup": "rtsim.loop.simulation",
-    "InputError": "rtsim.errors",
-    "LpvAircraft": "rtsim.lpv.aircraft",
-    "Margins": "rtsim.command",
-    "MocmError": "rtsim.pilot",
-    "Programme": "rtsim.programme",
-    "Reference": "rtsim.command",
-    "RtsimError": "rtsim.errors",
-    "Sensors": "rtsim.command",
-    "Simulation": "rtsim.loop.simulation",
-    "Xv15": "rtsim.aircraft.xv15.model",
-    "design_mocm": "rtsim.pilot",
-    "load_aircraft": "rtsim.lpv.aircraft",
-    "load_corridor": "rtsim.corridor",
-}
-
-__all__ = [
-    "Command",
-    "Corridor",
-    "FlightOptions",
-    "FlightSetup",
-    "InputError",
-    "LpvAircraft",
-    "Margins",
-    "MocmError",
-    "Programme",
-    "Reference",
-    "RtsimError",
-    "Sensors",
-    "Simulation",
-    "Xv15",
-    "__version__",
-    "design_mocm",
-    "load_aircraft",
-    "load_corridor",
-]
-
-
-def __getattr__(name: str) -> object:
-    if name not in _HOME:
-        raise AttributeError(f"module 'rtsim' has no attribute {name!r}")
-    from importlib import import_module
-
-    return getattr(import_module(_HOME[name]), name)
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
+__getattr__, __dir__, __all__ = names_of(__name__, __file__)

@@ -149,9 +149,7 @@ class Pilot(Protocol):
         """Give this frame's command.
 
         Args:
-            sensors: The aircraft as the pilot may know it.
             reference: What the scenario asks for.
-            dt: Length of the frame [s].
         """
         ...
 
@@ -164,9 +162,7 @@ class NacelleLaw(Protocol):
         """Give this frame's nacelle rate [rad/s].
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command of this frame.
-            dt: Length of the frame [s].
         """
         ...
 
@@ -181,9 +177,7 @@ class ProtectionLaw(Protocol):
         """Give the limited command and the interventions of this frame.
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command of this frame.
             margins: Distances to the corridor boundaries.
-            dt: Length of the frame [s].
         """
         ...

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 EXIT_EXPECTATION_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_OVERRUN = 3
@@ -41,7 +43,6 @@ class InputError(RtsimError):
 
         Args:
             problem: What is wrong, in a few words without full stop.
-            file: The file it stands in, where there is one.
             key: The key, option or argument, spelled as the user spells it.
             value: The offending value (shown with ``repr``); None leaves it out.
             allowed: The allowed range or choices, in words.
@@ -74,3 +75,32 @@ class OverrunStop(RtsimError):
 
 class TrimError(InputError):
     """No trim was found; the message names the residual that did not close."""
+
+
+def closest(word: str, choices: Iterable[str]) -> list[str]:
+    """Choices ordered by likeness to a word, the likeliest first.
+
+    Args:
+        word: What the user wrote.
+        choices: What could have been meant.
+    """
+    import difflib
+
+    def likeness(choice: str) -> float:
+        return difflib.SequenceMatcher(None, word.lower(), choice.lower()).ratio()
+
+    return sorted(choices, key=lambda choice: (-likeness(choice), choice))
+
+
+def suggestion(word: str, choices: Iterable[str], *, otherwise: str) -> str:
+    """An imperative that names the choice a user probably meant.
+
+    Args:
+        word: What the user wrote.
+        choices: What could have been meant.
+        otherwise: The imperative where nothing is similar.
+    """
+    import difflib
+
+    similar = difflib.get_close_matches(word.lower(), list(choices), n=1, cutoff=0.5)
+    return f"perhaps '{similar[0]}' is meant" if similar else otherwise

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from rtsim.arrays import FloatArray
 from rtsim.places import Places
 from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, POUND_FORCE, RPM
 
@@ -182,7 +182,6 @@ COLUMN = Places(*SIGNAL_NAMES)
 QUANTITY = Places(*(signal.quantity for signal in SIGNALS))
 """The same columns in SI, by the name without its unit: ``QUANTITY.airspeed``. The frame works with these."""
 
-FloatArray = npt.NDArray[np.float64]
 UNIT_SCALES: FloatArray = np.array([UNITS[signal.unit].scale for signal in SIGNALS])
 """What a column's number is multiplied by to be in SI, shape (SIGNAL_COUNT,)."""
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from rtsim.errors import InputError
+from rtsim.errors import InputError, closest, suggestion
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,32 +76,6 @@ def make_plugin(target: Callable[[], Any], name: str, kind: PluginKind) -> Any:
             value=name,
             mend="its class must take no arguments",
         ) from error
-
-
-def closest(word: str, choices: Iterable[str]) -> list[str]:
-    """Choices ordered by likeness to a word, the likeliest first.
-
-    Args:
-        word: What the user wrote.
-        choices: What could have been meant.
-    """
-
-    def likeness(choice: str) -> float:
-        return difflib.SequenceMatcher(None, word.lower(), choice.lower()).ratio()
-
-    return sorted(choices, key=lambda choice: (-likeness(choice), choice))
-
-
-def suggestion(word: str, choices: Iterable[str], *, otherwise: str) -> str:
-    """An imperative that names the choice a user probably meant.
-
-    Args:
-        word: What the user wrote.
-        choices: What could have been meant.
-        otherwise: The imperative where nothing is similar.
-    """
-    similar = difflib.get_close_matches(word.lower(), list(choices), n=1, cutoff=0.5)
-    return f"perhaps '{similar[0]}' is meant" if similar else otherwise
 
 
 def _from_module(name: str, kind: PluginKind) -> Any:

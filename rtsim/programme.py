@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.units import deg, kt, to_deg, to_kt
 
 AIRSPEED_RANGE = (kt(-40.0), kt(260.0))

@@ -91,15 +91,6 @@ def ft(value: Quantity) -> Quantity:
     return value * FOOT
 
 
-def to_ft(value: Quantity) -> Quantity:
-    """Length in metres to feet.
-
-    Args:
-        value: Length [m].
-    """
-    return value / FOOT
-
-
 def lb(value: Quantity) -> Quantity:
     """Mass in pounds to kilograms.
 

@@ -16,8 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rtsim.aircraft.profile import xv15_profile
-from rtsim.atmosphere import AirSpecification, Turbulence
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.loop.setup import FlightSetup
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.metrics import FlightFigures, measured

@@ -13,11 +13,11 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import COLUMN
 from rtsim.loop.simulation import FlightSetup, Simulation
-from rtsim.lpv import load_database
 from rtsim.lpv.building.checks import check_neighbours
+from rtsim.lpv.files.storage import load_database
 from rtsim.units import DEGREE, KNOT, deg
 from scenarios.files.loader import load_scenario
 

@@ -14,7 +14,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from rtsim.aircraft import OUTPUT, STATE, Condition, TrimPoint
+from rtsim.aircraft.points import Condition, TrimPoint
+from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15 import rotor_kernels as kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import FOOT, HORSEPOWER, POUND_FORCE, deg, kt, rpm, to_deg

@@ -10,9 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from rtsim.analysis.frozen_loop import Condition, StabilityMap, frozen_loop, stability_map
+from rtsim.analysis.frozen_loop import FrozenCommand, StabilityMap, frozen_loop, stability_map
 from rtsim.choices import OuterLoop
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.tables import prepare_tables
@@ -89,7 +89,7 @@ def draw_margins(database: Database) -> None:
     valid = database.valid[database.level_layer]
     values = np.full((6, *valid.shape), np.nan)
     for i, j in np.argwhere(valid):
-        loop = frozen_loop(database, Condition(database.airspeed[i], database.nacelle[j]), tables=(lpv, pilot))
+        loop = frozen_loop(database, FrozenCommand(database.airspeed[i], database.nacelle[j]), tables=(lpv, pilot))
         margins = loop.margins()
         values[:, i, j] = np.stack([margins.w_c, margins.phase_margin, np.minimum(margins.gain_margin, 30.0)]).T.ravel()
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
@@ -110,7 +110,7 @@ def draw_margins(database: Database) -> None:
     figure.supylabel("nacelle angle [deg]")
     figure.savefig(HERE / "pilot_margins.png", dpi=110)
     for airspeed, nacelle in TABLE_1:
-        m = frozen_loop(database, Condition(kt(airspeed), deg(nacelle)), tables=(lpv, pilot)).margins()
+        m = frozen_loop(database, FrozenCommand(kt(airspeed), deg(nacelle)), tables=(lpv, pilot)).margins()
         sys.stdout.write(
             f"| {airspeed}/{nacelle} | {m.w_c[0]:.2f}, {m.phase_margin[0]:.0f}, {m.gain_margin[0]:.1f} "
             f"| {m.w_c[1]:.2f}, {m.phase_margin[1]:.0f}, {m.gain_margin[1]:.1f} |\n"

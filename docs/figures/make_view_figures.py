@@ -13,7 +13,8 @@ from pathlib import Path
 from rerun.experimental import ViewerClient
 
 import scenarios
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from scenarios.files.options import Overrides
 from scenarios.flight.runner import FlightOutputs
 from telemetry.view import viewer as rerun_viewer

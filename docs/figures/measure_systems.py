@@ -9,9 +9,10 @@ import sys
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import PlantName
 from rtsim.command import Command
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
 from rtsim.units import deg, kt

@@ -14,9 +14,8 @@ from importlib import resources
 
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
-from rtsim.protection import MarginMonitor
 from rtsim.protection.assessment import assess_warnings
-from rtsim.protection.monitor import MarginHistory
+from rtsim.protection.monitor import MarginHistory, MarginMonitor
 from scenarios.campaign.draws import draw_plan
 from scenarios.campaign.spec import parse_campaign
 from scenarios.campaign.trial import Bench

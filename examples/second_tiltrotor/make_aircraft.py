@@ -23,9 +23,10 @@ import numpy as np
 
 from rtsim.aircraft.profile import OWN_SUFFIX, read_profile
 from rtsim.aircraft.variables import Variable
+from rtsim.arrays import FloatArray
 from rtsim.choices import OUTER_LOOPS, OuterLoop
-from rtsim.frame import FloatArray
-from rtsim.lpv.database import GRIDDED, Database, fill_invalid
+from rtsim.lpv.cells import fill_invalid
+from rtsim.lpv.database import GRIDDED, Database
 from rtsim.lpv.files.storage import load_database, save_database
 from rtsim.pilot.schedule import design_schedule
 from rtsim.units import kt

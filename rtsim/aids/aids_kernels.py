@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from rtsim.aircraft.variables import STATE
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 # Places in the switches; 1 on, 0 off.
@@ -93,10 +93,7 @@ def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) ->
     """Value of one map at a flight condition, bilinear and held outside the grid.
 
     Args:
-        tables: The aids.
         which: Number of the map.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
     """
     i, s = _cell(tables.airspeed, airspeed)
     j, t = _cell(tables.nacelle, nacelle)
@@ -152,7 +149,6 @@ def aids_airspeed(state: FloatArray, switches: FloatArray, x: FloatArray) -> flo
     Args:
         state: Their state before ``aids_step``.
         switches: Which are on.
-        x: Aircraft state.
     """
     if _changed(state, switches):
         return x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
@@ -234,11 +230,8 @@ def aids_engage(
     """Start or re-start the aids from the present flight so that the acting controls do not step.
 
     Args:
-        tables: The aids.
         state: Their state; overwritten.
         switches: Which are on.
-        x: Aircraft state.
-        nacelle: Nacelle angle [rad].
         hands: Stick and lever as the pilot holds them.
         flaps: Deflection in each interval between settings less that of the schedule at the aids' airspeed [rad].
         acting: Stick and lever that acted last.
@@ -278,15 +271,11 @@ def aids_step(
     last is kept as an offset that fades away, so no control steps.
 
     Args:
-        tables: The aids.
         state: Their state, updated in place.
         switches: Which are on, shape (SWITCH_COUNT,).
-        x: Aircraft state.
-        nacelle: Nacelle angle [rad].
         hands: Stick and lever as the pilot holds them.
         flaps: Deflection in each interval between settings less that of the schedule at the aids' airspeed [rad].
         acting: In: stick and lever that acted last; out: those that act now.
-        dt: Length of the frame [s].
     """
     if _changed(state, switches):
         aids_engage(tables, state, switches, x, nacelle, hands, flaps, acting)

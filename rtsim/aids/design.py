@@ -27,9 +27,9 @@ from rtsim.aids.aids_kernels import (
     AidTables,
 )
 from rtsim.aircraft.variables import FLAP_INPUTS, position
+from rtsim.arrays import FloatArray
 from rtsim.choices import AidName, SwitchName
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import settled
@@ -52,11 +52,7 @@ RIGID_BODY = ("u", "w", "q", "pitch")
 
 @functools.lru_cache(maxsize=4)
 def design_aids(database: Database) -> AidTables:
-    """Make the aids' schedules: what the controls do at each grid point once rotor and actuators have settled.
-
-    Args:
-        database: The LPV database.
-    """
+    """Make the aids' schedules: what the controls do at each grid point once rotor and actuators have settled."""
     # A database of one's own may lack flap inputs: the flaps stay where its schedule has them.
     flaps = [name for name in FLAP_INPUTS if position(database.inputs, name) >= 0]
     model = settled(database, keep=RIGID_BODY, inputs=("stick", "lever", *flaps), purpose="the aids")

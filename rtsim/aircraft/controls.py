@@ -18,9 +18,6 @@ from rtsim.units import deg, kt
 def control_tables(profile: AircraftProfile) -> ControlTables:
     """Controls of an aircraft; the XV-15's are those of its nonlinear model.
 
-    Args:
-        profile: The aircraft.
-
     Raises:
         InputError: A value is missing or out of range.
     """

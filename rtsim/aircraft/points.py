@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

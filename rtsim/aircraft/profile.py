@@ -3,6 +3,9 @@
 A profile is a TOML document. The XV-15's names one file for each part; a profile of one's own stands beside its
 database (``NAME.profile.toml``) or inside it (attribute ``aircraft_profile``), holds the parts as tables of the same
 layout, and says with ``borrows`` which it takes from the XV-15. Each subsystem reads its own part, and checks it there.
+
+Legend:
+    key: Its name.
 """
 
 from __future__ import annotations
@@ -11,15 +14,14 @@ import hashlib
 import itertools
 import json
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from rtsim.errors import InputError
+from rtsim.toml_file import parse_toml, read_text, shipped_toml
 
 PartName = Literal["nacelle", "corridor", "protection", "systems", "controls", "dimensions", "pilot", "aids"]
 PARTS: tuple[PartName, ...] = get_args(PartName)
@@ -29,7 +31,8 @@ PROFILE_ATTRIBUTE = "aircraft_profile"
 """Attribute of a database file that holds its profile."""
 OWN_SUFFIX = ".profile.toml"
 """How the name of a profile beside a database ends."""
-LARGEST_PROFILE_BYTES = 1_000_000
+XV15_DATA = "rtsim/aircraft/xv15/data"
+"""Where the XV-15's numbers lie."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,9 +49,6 @@ class Part:
     def table(self, key: str) -> Part:
         """A table within this one.
 
-        Args:
-            key: Its name.
-
         Raises:
             InputError: There is none.
         """
@@ -58,18 +58,13 @@ class Part:
         return Part(f"{self.name}.{key}", self.file, value)
 
     def has(self, key: str) -> bool:
-        """Whether there is a value.
-
-        Args:
-            key: Its name.
-        """
+        """Whether there is a value."""
         return key in self.data
 
     def number(self, key: str, *, low: float = -math.inf, high: float = math.inf) -> float:
         """A number within a range.
 
         Args:
-            key: Its name.
             low: Smallest value allowed.
             high: Largest value allowed.
 
@@ -84,7 +79,6 @@ class Part:
         """A list of numbers within a range.
 
         Args:
-            key: Its name.
             low: Smallest value allowed.
             high: Largest value allowed.
             count: How many there must be; None: any number but none.
@@ -104,9 +98,6 @@ class Part:
 
     def text(self, key: str) -> str:
         """A text.
-
-        Args:
-            key: Its name.
 
         Raises:
             InputError: It is missing or no text.
@@ -185,17 +176,12 @@ class AircraftProfile:
 @cache
 def xv15_profile() -> AircraftProfile:
     """The XV-15's profile, from its folder."""
-    folder = resources.files("rtsim.aircraft.xv15") / "data"
-
-    def read(name: str) -> dict[str, Any]:
-        return tomllib.loads((folder / name).read_text(encoding="utf-8"))
-
-    document = read("profile.toml")
-    files = {part: document[part] if isinstance(document[part], str) else "profile.toml" for part in PARTS}
-    parts: dict[str, Any] = {
-        part: Part(part, f"xv15/data/{file}", read(file) if document[part] == file else document[part])
-        for part, file in files.items()
-    }
+    document = shipped_toml(XV15_DATA, "profile.toml")
+    parts: dict[str, Any] = {}
+    for part in PARTS:
+        named = isinstance(document[part], str)
+        file = document[part] if named else "profile.toml"
+        parts[part] = Part(part, f"xv15/data/{file}", shipped_toml(XV15_DATA, file) if named else document[part])
     return AircraftProfile(name=document["name"], file="xv15/data/profile.toml", **parts)
 
 
@@ -214,13 +200,7 @@ def read_profile(path: Path) -> AircraftProfile:
     Raises:
         InputError: It cannot be read, or a part is neither there nor borrowed.
     """
-    try:
-        if path.stat().st_size > LARGEST_PROFILE_BYTES:
-            raise InputError("is too large for an aircraft profile", file=str(path))
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {error}", file=str(path)) from None
-    return parse_profile(text, file=str(path))
+    return parse_profile(read_text(path, noun="aircraft profile"), file=str(path))
 
 
 def parse_profile(text: str, *, file: str) -> AircraftProfile:
@@ -228,15 +208,11 @@ def parse_profile(text: str, *, file: str) -> AircraftProfile:
 
     Args:
         text: The TOML document.
-        file: Where it came from, for messages.
 
     Raises:
         InputError: It is not valid TOML, or a part is neither there nor borrowed.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", file=file, mend="correct this line") from None
+    document = parse_toml(text, file=file)
     borrowed = document.pop("borrows", [])
     name = document.pop("name", None)
     if not isinstance(name, str) or not name:

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rtsim.aircraft.table_kernels import Curves, FloatArray, Surfaces
+from rtsim.aircraft.table_kernels import Curves, Surfaces
+from rtsim.arrays import FloatArray
 
 
 def smooth_curves(arguments: Sequence[Sequence[float]], values: Sequence[Sequence[float]], grid: FloatArray) -> Curves:

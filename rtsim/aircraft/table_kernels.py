@@ -9,12 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Curves(NamedTuple):

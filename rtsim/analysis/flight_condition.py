@@ -1,4 +1,8 @@
-"""What ``rtsim trim`` and ``rtsim linearize`` answer: a flight condition solved from the database or afresh."""
+"""What ``rtsim trim`` and ``rtsim linearize`` answer: a flight condition solved from the database or afresh.
+
+Legend:
+    request: What was asked for.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +17,16 @@ from rtsim.errors import InputError, TrimError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    import numpy as np
-    import numpy.typing as npt
-
-    from rtsim.aircraft import Condition, TrimPoint, Variable
+    from rtsim.aircraft.points import Condition, TrimPoint
     from rtsim.aircraft.profile import AircraftProfile
+    from rtsim.aircraft.variables import Variable
+    from rtsim.arrays import FloatArray
     from rtsim.choices import OuterLoop
-    from rtsim.lpv import LpvAircraft
-
-    FloatArray = npt.NDArray[np.float64]
+    from rtsim.lpv.aircraft import LpvAircraft
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class AskedCondition:
     """A flight condition as asked for on the command line, in the units of the options."""
 
     airspeed_kt: float
@@ -68,7 +69,7 @@ _LIMITS: tuple[tuple[str, float, float, str], ...] = (
 def _stops(profile: AircraftProfile) -> tuple[tuple[str, float, float, str], ...]:
     """Stops of controls and gimbal, and what all engines give at most (docs/model.md): key, range, unit."""
     from rtsim.aircraft.controls import control_tables
-    from rtsim.protection import load_limits
+    from rtsim.protection.limits import load_limits
     from rtsim.systems.settings import all_engines_power
     from rtsim.units import HORSEPOWER, to_deg
 
@@ -114,11 +115,8 @@ def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
     ]
 
 
-def checked(request: Request) -> Request:
+def checked(request: AskedCondition) -> AskedCondition:
     """Refuse values out of range.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The same request.
@@ -166,8 +164,8 @@ def checked_outer_loop(outer_loop: str) -> OuterLoop:
     )
 
 
-def _condition(request: Request) -> Condition:
-    from rtsim.aircraft import Condition
+def _condition(request: AskedCondition) -> Condition:
+    from rtsim.aircraft.points import Condition
     from rtsim.units import deg, kt, lb, rpm
 
     return Condition(
@@ -181,17 +179,14 @@ def _condition(request: Request) -> Condition:
     )
 
 
-def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
+def nonlinear_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     """Trim the nonlinear model at the condition.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The result by JSON key, and the trim.
     """
-    from rtsim.aircraft import INPUTS, OUTPUTS, STATES
     from rtsim.aircraft.profile import xv15_profile
+    from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES
     from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.units import to_deg, to_rpm
@@ -209,11 +204,8 @@ def nonlinear_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     return _trim_result(request, xv15_profile(), values, configuration, point.converged), point
 
 
-def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
+def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     """Trim the LPV aircraft.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The result by JSON key, and the trim.
@@ -233,11 +225,8 @@ def database_trim(request: Request) -> tuple[dict[str, Any], TrimPoint]:
     return _trim_result(request, database.profile, values, configuration, point.converged), point
 
 
-def solvable(request: Request) -> Request:
+def solvable(request: AskedCondition) -> AskedCondition:
     """Ask the nonlinear model where the shipped database has no answer: beside its edge there may be a trim.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The request, or the same for the nonlinear model.
@@ -263,8 +252,8 @@ def solvable(request: Request) -> Request:
     return dataclasses.replace(request, nonlinear=True)
 
 
-def _lpv(request: Request) -> LpvAircraft:
-    from rtsim.lpv import load_aircraft
+def _lpv(request: AskedCondition) -> LpvAircraft:
+    from rtsim.lpv.aircraft import load_aircraft
 
     return load_aircraft(request.database)
 
@@ -282,13 +271,13 @@ def _named(
 
 
 def _trim_result(
-    request: Request,
+    request: AskedCondition,
     profile: AircraftProfile,
     values: dict[str, float],
     configuration: tuple[float, float],
     converged: bool,
 ) -> dict[str, Any]:
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
     from rtsim.faults.fault import transmission_efficiency
     from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, to_deg
 
@@ -330,11 +319,10 @@ def _beyond_limits(solved: dict[str, float], profile: AircraftProfile) -> list[s
     return found
 
 
-def no_trim(request: Request, point: TrimPoint) -> TrimError:
+def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
     """Say that there is no trim, and what did not close.
 
     Args:
-        request: What was asked for.
         point: Where the search ended.
 
     Returns:
@@ -348,11 +336,8 @@ def no_trim(request: Request, point: TrimPoint) -> TrimError:
     return TrimError(f"there is no level-flight trim at {where}{left}", mend=mend)
 
 
-def nonlinear_model(request: Request) -> dict[str, Any]:
+def nonlinear_model(request: AskedCondition) -> dict[str, Any]:
     """Linearize the nonlinear model at the condition.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The model by JSON key.
@@ -360,7 +345,7 @@ def nonlinear_model(request: Request) -> dict[str, Any]:
     Raises:
         TrimError: There is no trim to linearize at.
     """
-    from rtsim.aircraft import INPUTS, OUTPUTS, STATES
+    from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.lpv.building.xv15_grid import flown_model
 
@@ -372,11 +357,8 @@ def nonlinear_model(request: Request) -> dict[str, Any]:
     return _model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
 
 
-def database_model(request: Request) -> dict[str, Any]:
+def database_model(request: AskedCondition) -> dict[str, Any]:
     """Take the linear model from the database.
-
-    Args:
-        request: What was asked for.
 
     Returns:
         The model by JSON key.
@@ -395,11 +377,10 @@ def database_model(request: Request) -> dict[str, Any]:
     return _model_result((database.states, database.inputs, database.outputs), matrices)
 
 
-def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
+def closed_loop_model(request: AskedCondition, outer_loop: str) -> dict[str, Any]:
     """Linearize the loop of aircraft and pilot, frozen at the condition and sampled as flown.
 
     Args:
-        request: What was asked for.
         outer_loop: ``integrators`` or ``pi``.
 
     Returns:
@@ -411,8 +392,7 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
     """
     import numpy as np
 
-    from rtsim.analysis.frozen_loop import Condition as Command
-    from rtsim.analysis.frozen_loop import frozen_loop
+    from rtsim.analysis.frozen_loop import FrozenCommand, frozen_loop
     from rtsim.units import deg, kt
 
     if request.solves_nonlinear:
@@ -436,7 +416,7 @@ def closed_loop_model(request: Request, outer_loop: str) -> dict[str, Any]:
             allowed=", ".join(database.pilot) or "none",
             mend="run 'rtsim model build'",
         )
-    loop = frozen_loop(database, Command(airspeed, nacelle), outer_loop=chosen)
+    loop = frozen_loop(database, FrozenCommand(airspeed, nacelle), outer_loop=chosen)
     matrix = loop.matrix
     pilot_states = matrix.shape[0] - len(database.states)
     names = [variable.name for variable in database.states] + [f"pilot_{k}" for k in range(pilot_states)]

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.variables import required_position
+from rtsim.arrays import ComplexArray, FloatArray
 from rtsim.choices import OuterLoop
 from rtsim.lpv.database import Database
 from rtsim.lpv.lpv_kernels import LpvTables, lpv_step, work_size
@@ -21,8 +22,7 @@ from rtsim.lpv.tables import Form, prepare_tables
 from rtsim.pilot import pilot_kernels as kernels
 from rtsim.pilot.design_plant import CONTROLS
 from rtsim.pilot.pilot_kernels import PilotTables
-from rtsim.pilot.problem import FloatArray
-from rtsim.pilot.response import ComplexArray, Margins, margins, one_at_a_time
+from rtsim.pilot.response import Margins, margins, one_at_a_time
 from rtsim.pilot.tables import load_pilot_tables
 
 _STEP = 1e-5
@@ -86,7 +86,7 @@ class FrozenLoop:
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class FrozenCommand:
     """A frozen command. SI and radians."""
 
     airspeed: float
@@ -102,7 +102,9 @@ class Condition:
 class _Frame:
     """The two halves of one frame as functions of flat states, allocated once."""
 
-    def __init__(self, database: Database, lpv: LpvTables, pilot: PilotTables, condition: Condition, dt: float) -> None:
+    def __init__(
+        self, database: Database, lpv: LpvTables, pilot: PilotTables, condition: FrozenCommand, dt: float
+    ) -> None:
         self.lpv, self.pilot, self.dt = lpv, pilot, dt
         self.nacelle = condition.nacelle_angle
         self.reference = np.array([condition.airspeed, condition.acceleration, condition.altitude, 0.0, 0.0])
@@ -141,7 +143,7 @@ def _jacobian(function: Callable[[FloatArray], FloatArray], at: FloatArray, step
     return np.array(columns).T
 
 
-def _trim_state(database: Database, condition: Condition) -> tuple[FloatArray, FloatArray]:
+def _trim_state(database: Database, condition: FrozenCommand) -> tuple[FloatArray, FloatArray]:
     """Interpolated trim state and controls of the condition."""
     level = database.level_layer
     layers = database.layer_acceleration
@@ -165,7 +167,7 @@ def _trim_state(database: Database, condition: Condition) -> tuple[FloatArray, F
 
 def frozen_loop(
     database: Database,
-    condition: Condition,
+    condition: FrozenCommand,
     *,
     outer_loop: OuterLoop = "integrators",
     dt: float = 0.004,
@@ -175,10 +177,8 @@ def frozen_loop(
     """Linearize aircraft and pilot as flown, frozen at one command.
 
     Args:
-        database: Trims, linear models and pilot gains.
         condition: The command.
         outer_loop: How airspeed and altitude are held.
-        dt: Length of a frame [s].
         form: Form of the LPV aircraft.
         tables: Prepared tables of aircraft and pilot, to save time on maps; None: prepared from the database.
 
@@ -241,11 +241,9 @@ def stability_map(
     """Map the frozen loop's growth over all valid grid points or the middles of all valid cells.
 
     Args:
-        database: Trims, linear models and pilot gains.
         outer_loop: How airspeed and altitude are held.
         mid_cells: Middles of cells instead of grid points.
         layer: Layer of the trims; None: level flight.
-        dt: Length of a frame [s].
         tables: Prepared tables; None: prepared from the database.
 
     Returns:
@@ -261,6 +259,6 @@ def stability_map(
     growth = np.full(valid.shape, np.nan)
     acceleration = float(database.layer_acceleration[number])
     for i, j in np.argwhere(valid):
-        condition = Condition(float(v[i]), float(n[j]), acceleration)
+        condition = FrozenCommand(float(v[i]), float(n[j]), acceleration)
         growth[i, j] = frozen_loop(database, condition, dt=dt, tables=chosen).growth()
     return StabilityMap(airspeed=v, nacelle=n, growth=growth)

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from rtsim.aids.aids_kernels import AID_COUNT, AID_STATE_SIZE, LAST_SWITCHES, aids_engage, aids_step
 from rtsim.aids.design import design_aids, switches_of
+from rtsim.arrays import FloatArray
 from rtsim.choices import AidName
-from rtsim.frame import FloatArray
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
 from rtsim.lpv.tables import prepare_tables
@@ -52,8 +52,6 @@ def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tu
 
     Args:
         aircraft: The LPV aircraft.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
         aids: The aids that are on.
     """
     trim = aircraft.trim(airspeed=airspeed, nacelle=nacelle)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.optimization.path import ConversionPath
 from rtsim.units import to_deg, to_kt
 
@@ -46,7 +46,7 @@ def path_stability(path: ConversionPath, *, points: int = 40, outer_loop: str = 
         points: How many.
         outer_loop: ``integrators`` or ``pi``.
     """
-    from rtsim.analysis.frozen_loop import Condition, frozen_loop
+    from rtsim.analysis.frozen_loop import FrozenCommand, frozen_loop
     from rtsim.lpv.aircraft import load_aircraft
     from rtsim.lpv.tables import prepare_tables
     from rtsim.pilot.tables import load_pilot_tables
@@ -59,9 +59,11 @@ def path_stability(path: ConversionPath, *, points: int = 40, outer_loop: str = 
     time = np.linspace(0.0, programme.duration, points)
     at = [programme.at(float(t)) for t in time]
     rates = [programme.rates_at(float(t)) for t in time]
-    level = [frozen_loop(database, Condition(p.airspeed, p.nacelle_angle), dt=dt, tables=tables).growth() for p in at]
+    level = [
+        frozen_loop(database, FrozenCommand(p.airspeed, p.nacelle_angle), dt=dt, tables=tables).growth() for p in at
+    ]
     moving = [
-        frozen_loop(database, Condition(p.airspeed, p.nacelle_angle, r.airspeed), dt=dt, tables=tables).growth()
+        frozen_loop(database, FrozenCommand(p.airspeed, p.nacelle_angle, r.airspeed), dt=dt, tables=tables).growth()
         for p, r in zip(at, rates, strict=True)
     ]
     return PathStability(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere import gust_kernels as kernels
 from rtsim.atmosphere.gust_kernels import GustTables
 from rtsim.atmosphere.specification import SEVERITY_WIND, AirSpecification, Gust, GustShape, Severity, Turbulence
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.units import FOOT
 
 GUST_SHAPES: dict[GustShape, int] = {
@@ -78,11 +78,7 @@ def new_gust_state(air: AirSpecification, normals: FloatArray | None = None) -> 
 
 
 def normals_needed(state: FloatArray) -> int:
-    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3.
-
-    Args:
-        state: Gust state.
-    """
+    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3."""
     return kernels.NORMALS_PER_FRAME if state[dryden.T_ACTIVE] != 0.0 else 0
 
 

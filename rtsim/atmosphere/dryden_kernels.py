@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import FOOT
 
@@ -75,8 +75,6 @@ def high_altitude_intensity(tables: TurbulenceTables, altitude: float, wind: flo
     Beyond the strongest curve the intensity grows in proportion to the wind.
 
     Args:
-        tables: Parameters.
-        altitude: Height [m].
         wind: Wind at 20 ft that names the severity [m/s].
 
     Returns:
@@ -104,8 +102,6 @@ def turbulence_scales(tables: TurbulenceTables, altitude: float, wind: float) ->
     """Intensities and scale lengths at a height (MIL-F-8785C 3.7.2 and 3.7.3.4).
 
     Args:
-        tables: Parameters.
-        altitude: Height above the ground [m].
         wind: Wind at 20 ft [m/s].
 
     Returns:
@@ -208,10 +204,8 @@ def turbulence_step(
     """Move the turbulence on by a frame and give it there.
 
     Args:
-        tables: Parameters.
         state: State, updated in place; its first ``T_SIZE`` entries are used.
         speed: Airspeed; its size counts, and at least ``minimum_speed`` [m/s].
-        altitude: Height above the ground [m].
         dt: Length of the frame that ends now; 0 at the start of the flight [s].
         normals: Three standard normals; not read without turbulence.
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 # The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
@@ -99,10 +99,8 @@ def gust_step(
     """Move the gusts on to a time and give what acts during the frame that starts there.
 
     Args:
-        tables: Parameters.
         state: Gust state, updated in place.
         airspeed: Speed through the undisturbed air [m/s].
-        altitude: Height above the ground [m].
         pitch: Pitch attitude [rad].
         time: Time at the start of the frame [s].
         dt: Length of the frame that ends at ``time``; 0 at the start of the flight [s].

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from rtsim.analysis.flight_condition import (
-    Request,
+    AskedCondition,
     checked,
     checked_outer_loop,
     closed_loop_model,
@@ -37,11 +37,7 @@ _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the commands to the app."""
     app.command("trim")(trim_command)
     app.command("linearize")(linearize_command)
 
@@ -66,8 +62,8 @@ def trim_command(
     covers, where one of the grid points around has no trim, the nonlinear model is asked too.
     """
     request = checked(
-        Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
-                database)
+        AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
+                       acceleration_kt_s, database)
     )  # fmt: skip
     request = solvable(request)
     result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
@@ -103,8 +99,8 @@ def linearize_command(
     and outer loops as flown: A is the map over one 4 ms frame, and the eigenvalues are log(z)/dt.
     """
     request = checked(
-        Request(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m, acceleration_kt_s,
-                database)
+        AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
+                       acceleration_kt_s, database)
     )  # fmt: skip
     checked_outer_loop(outer_loop)
     if closed_loop:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, progress, results, whole_file
+from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
+from rtsim.whole_file import whole_file, write_whole
 
 if TYPE_CHECKING:
     from scenarios.campaign.executors import Executor
@@ -22,11 +23,7 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("campaign")(run_campaign_command)
 
 
@@ -146,8 +143,7 @@ def _save(result: CampaignResult, report: dict[str, Any], folder: Path) -> None:
 
     from rtsim.measures.metrics import TRIAL_METRICS, TrialMetrics
 
-    with whole_file(folder / "report.json") as temporary:
-        temporary.write_text(json.dumps(_finite(report), indent=1), encoding="utf-8")
+    write_whole(folder / "report.json", json.dumps(_finite(report), indent=1))
     with (
         whole_file(folder / "flights.csv") as temporary,
         temporary.open("w", encoding="utf-8", newline="") as stream,
@@ -199,8 +195,7 @@ def _write_junit(result: CampaignResult, path: Path) -> None:
     ]
     error = f"{broken[0]} ({len(broken)} in all)" if broken else ""
     cases.append(JunitCase(name="the law runs without failing", suite=suite, seconds=result.wall_s, error=error))
-    with whole_file(path) as temporary:
-        temporary.write_bytes(junit_xml("rtsim campaign", cases))
+    write_whole(path, junit_xml("rtsim campaign", cases))
 
 
 def _print(report: dict[str, Any]) -> None:

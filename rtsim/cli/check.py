@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
 from rtsim.cli.output import console, emit_json, results
-from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError
+from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, suggestion
+from rtsim.toml_file import read_text, read_toml
 
 if TYPE_CHECKING:
-    from rtsim.lpv import Database
+    from rtsim.lpv.database import Database
 
 DATABASE_SUFFIXES = (".nc", ".mat")
 """Files with these endings are read as LPV databases."""
@@ -21,11 +21,7 @@ PROFILE_SUFFIX = ".profile.toml"
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("check")(check_command)
 
 
@@ -70,7 +66,6 @@ def file_problems(name: str) -> list[str]:
     """
     if Path(name).suffix in DATABASE_SUFFIXES:
         return _database_problems(Path(name))
-    from rtsim.plugins import suggestion
     from scenarios.files.loader import scenario_problems
 
     suffix = Path(name).suffix
@@ -102,16 +97,15 @@ def file_problems(name: str) -> list[str]:
 def _top_keys(path: Path) -> set[str]:
     """Keys of a TOML file, which tell what it is; none where it cannot be read."""
     try:
-        with path.open("rb") as file:
-            return set(tomllib.load(file))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
+        return set(read_toml(path, noun="scenario"))
+    except InputError:
         return set()  # the scenario reader tells what is wrong
 
 
 def _campaign_problems(name: str) -> list[str]:
     from scenarios.campaign.spec import parse_campaign
 
-    return [str(problem) for problem in parse_campaign(Path(name).read_text(encoding="utf-8"), file=name)[1]]
+    return [str(problem) for problem in parse_campaign(read_text(name, noun="campaign"), file=name)[1]]
 
 
 def _profile_problems(path: Path) -> list[str]:
@@ -142,25 +136,22 @@ def _stick_map_problems(name: str) -> list[str]:
 def check_profile(database: Database) -> None:
     """Read every part of an aircraft's profile, as its flights do.
 
-    Args:
-        database: The aircraft.
-
     Raises:
         InputError: The first number that is missing or out of range.
     """
-    from rtsim.aids import design_aids
+    from rtsim.aids.design import design_aids
     from rtsim.aircraft.controls import control_tables
-    from rtsim.atmosphere import CALM
     from rtsim.atmosphere.air import gust_tables
+    from rtsim.atmosphere.specification import CALM
     from rtsim.choices import ChartName
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
     from rtsim.faults.schedule import fault_tables
-    from rtsim.nacelle import load_nacelle_tables
+    from rtsim.nacelle.switch import load_nacelle_tables
     from rtsim.optimization.paths import conversion_end_kt
     from rtsim.pilot.weights import pilot_settings
     from rtsim.protection.limits import load_levels
     from rtsim.protection.tables import law_tables
-    from rtsim.systems import load_drive_tables, load_flap_tables
+    from rtsim.systems.settings import load_drive_tables, load_flap_tables
 
     profile = database.profile
     for read in (control_tables, load_nacelle_tables, load_levels, load_flap_tables, load_drive_tables, pilot_settings):

@@ -8,23 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rtsim.cli.output import console, emit_json, results, whole_file
+from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
+from rtsim.whole_file import whole_file
 
 if TYPE_CHECKING:
     from rtsim.command import Margins
-    from rtsim.corridor import Boundary, Corridor
+    from rtsim.corridor.boundaries import Boundary, Corridor
 
 _DIGITS = 6
 _TABLE_ANGLES_DEG = (90.0, 85.0, 80.0, 75.0, 70.0, 65.0, 60.0, 55.0, 50.0, 45.0, 40.0, 30.0, 20.0, 10.0, 0.5, 0.0)
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("corridor")(corridor_command)
 
 
@@ -45,13 +42,13 @@ def corridor_command(
     plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
 ) -> None:
     """Show the boundaries and centre line of the conversion corridor; with a point, its margins."""
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
     from rtsim.units import deg, kt
 
     point = _point(airspeed_kt, nacelle_deg)
     if corridor == "model" or database is not None:
         from rtsim.lpv.files.storage import load_database
-        from rtsim.protection import load_boundary
+        from rtsim.protection.boundary import load_boundary
 
         chosen = load_boundary(corridor, load_database(database))
     else:
@@ -81,7 +78,7 @@ def corridor_command(
 def _inconsistencies(corridor: Corridor, database: Path | None) -> list[dict[str, Any]]:
     """Stretches where the corridor is wider than the level trims of the aircraft within their limits."""
     from rtsim.lpv.files.storage import load_database
-    from rtsim.protection import check_consistency
+    from rtsim.protection.boundary import check_consistency
     from rtsim.units import to_deg, to_kt
 
     return [

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from rtsim.cli.output import console, progress
 
 if TYPE_CHECKING:
-    from rtsim.frame import FloatArray
-    from rtsim.realtime import FlightControl
+    from rtsim.arrays import FloatArray
+    from rtsim.realtime.control import FlightControl
     from scenarios.files.scenario import Scenario
     from scenarios.flight.result import FlightRecord, Verdict
     from telemetry.log.format import LogEvent
@@ -34,7 +34,6 @@ class FlightScreen:
         """Prepare.
 
         Args:
-            scenario: What is flown.
             control: Tells whether the flight is paused, and its speed.
             paced: Whether it is flown on the wall clock.
         """
@@ -122,7 +121,6 @@ def status_line(row: FloatArray, control: FlightControl) -> str:
     """One line about a frame.
 
     Args:
-        row: The frame, shape (SIGNAL_COUNT,).
         control: Tells whether the flight is paused, and its speed.
     """
     from rtsim.frame import COLUMN
@@ -150,7 +148,6 @@ def describe(scenario: Scenario, *, speed: float, outputs: list[str]) -> None:
     """Say what is about to be flown.
 
     Args:
-        scenario: What is flown.
         speed: Multiple of real time; infinity is as fast as possible.
         outputs: Where the flight goes, in words.
     """

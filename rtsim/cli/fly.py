@@ -21,7 +21,7 @@ from rtsim.cli.output import emit_json
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
 
 if TYPE_CHECKING:
-    from rtsim.realtime import FlightControl
+    from rtsim.realtime.control import FlightControl
     from scenarios.files.scenario import Scenario
     from scenarios.flight.result import FlightRecord
     from telemetry.view.options import ViewOptions
@@ -36,11 +36,7 @@ Severity = Literal["none", "light", "moderate", "severe"]
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("fly")(fly_command)
 
 

@@ -24,11 +24,7 @@ HOLD_MODE = 0x03040000
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("joystick")(joystick_command)
 
 

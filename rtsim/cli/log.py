@@ -17,11 +17,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 
 
 def register(app: typer.Typer) -> None:
-    """Add the commands to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the commands to the app."""
     app.command("plot")(plot_command)
     group = typer.Typer(no_args_is_help=True, help="What a flight log holds; CSV and MAT for other programs.")
     group.command("info")(info_command)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from rtsim.lpv import Database
+    from rtsim.lpv.database import Database
 
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 _SUFFIXES = (".nc", ".mat")
@@ -26,11 +26,7 @@ _BUILD_SHARE, _PILOT_SHARE = 0.2, 0.4  # of the work: the trims and models, and 
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command group to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command group to the app."""
     group = typer.Typer(no_args_is_help=True, help="The LPV database: trim map, linear models and pilot gains.")
     group.callback()(_group)
     group.command("build")(build_command)
@@ -80,7 +76,8 @@ def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> 
 def _with_pilots(database: Database, jobs: int, advance: Callable[[float], None]) -> Database:
     """Design the MOCM in all its forms; each tells its progress from 0 to 1."""
     from rtsim.choices import OUTER_LOOPS
-    from rtsim.lpv.database import JACOBIAN_BITS, PilotArrays, round_mantissa
+    from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
+    from rtsim.lpv.database import PilotArrays
     from rtsim.pilot.schedule import design_schedule
 
     for outer_loop in OUTER_LOOPS:
@@ -158,9 +155,6 @@ def import_command(
 def summary(database: Database) -> dict[str, Any]:
     """Describe a database in numbers.
 
-    Args:
-        database: The database.
-
     Returns:
         What ``rtsim model info --json`` prints, without the file name.
     """
@@ -199,7 +193,7 @@ def summary(database: Database) -> dict[str, Any]:
 def _inside_corridor(database: Database) -> npt.NDArray[np.bool_]:
     import numpy as np
 
-    from rtsim.corridor import load_corridor
+    from rtsim.corridor.boundaries import load_corridor
 
     corridor = load_corridor("design", database.profile)
     # 1e-6 m/s: a grid point on the boundary is inside whatever the rounding

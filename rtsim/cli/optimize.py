@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, results, whole_file
+from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
+from rtsim.whole_file import write_whole
 
 if TYPE_CHECKING:
     from rtsim.optimization.path import ConversionPath
@@ -23,11 +24,7 @@ _OWN = "the specification's"
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("optimize")(optimize_command)
 
 
@@ -172,8 +169,7 @@ def _save(
     from rtsim.optimization.report import baseline_summary, best_path, figures_summary, nonlinear_check, scenario_text
 
     path = best_path(problem, result)
-    with whole_file(scenario_file) as temporary:
-        temporary.write_text(scenario_text(problem, path), encoding="utf-8")
+    write_whole(scenario_file, scenario_text(problem, path))
     spec = problem.spec
     flown = problem.fly([path])[0][0]
     summary: dict[str, Any] = {

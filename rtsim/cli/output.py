@@ -6,13 +6,11 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Literal
-
-from rtsim.errors import OutputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -129,28 +127,3 @@ def progress(description: str, *, total: float) -> Iterator[Callable[[float], No
     with Progress(*columns, console=console.real(), transient=False) as bar:
         task = bar.add_task(description, total=total)
         yield lambda amount: bar.advance(task, amount)
-
-
-@contextmanager
-def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside the target; renamed at the end, so that a file is whole or not there.
-
-    Args:
-        path: The target; an existing file is replaced.
-
-    Yields:
-        The temporary path to write, with the suffix of the target.
-
-    Raises:
-        OutputError: Writing or renaming failed.
-    """
-    temporary = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        yield temporary
-        temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}.") from error
-    finally:
-        # After success there is nothing left under this name; after Ctrl-C or a fault there must not be.
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)

@@ -15,11 +15,7 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command group to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command group to the app."""
     group = typer.Typer(no_args_is_help=True, help="Design the virtual pilot (Modified Optimal Control Model).")
     group.callback()(_group)
     group.command("design")(design_command)

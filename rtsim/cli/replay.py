@@ -13,11 +13,7 @@ from rtsim.errors import EXIT_EXPECTATION_FAILED
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("replay")(replay_command)
 
 

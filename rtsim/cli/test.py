@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, progress, results, whole_file
+from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError, RtsimError
+from rtsim.whole_file import write_whole
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
@@ -17,11 +18,7 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("test")(run_tests)
 
 
@@ -54,8 +51,7 @@ def run_tests(
     if html is not None:
         from scenarios.verdicts.html_report import html_report
 
-        with whole_file(html) as temporary:
-            temporary.write_text(html_report(cases), encoding="utf-8")
+        write_whole(html, html_report(cases))
     bundles = _bundles(cases, out)
     failed = sum(case.verdict != "passed" for case in cases)
     if json:
@@ -141,8 +137,7 @@ def _write_junit(cases: list[Case], path: Path) -> None:
             for case in cases
         ],
     )
-    with whole_file(path) as temporary:
-        temporary.write_bytes(document)
+    write_whole(path, document)
 
 
 def _bundles(cases: list[Case], out: Path | None) -> dict[str, str]:

@@ -23,11 +23,7 @@ DRIFT_GOAL_FRAMES = 1.0
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the app.
-
-    Args:
-        app: The ``rtsim`` command.
-    """
+    """Add the command to the app."""
     app.command("timing")(timing_command)
 
 
@@ -59,7 +55,7 @@ def timing_command(
 def _measure(duration: float, rate: int) -> tuple[TimingReport, TimingLog]:
     """Fly the hover live, with nothing attached to it."""
     from rtsim.loop.simulation import Simulation
-    from rtsim.realtime import Executive
+    from rtsim.realtime.executive import Executive
     from scenarios.files.loader import load_scenario
     from scenarios.files.options import Overrides, with_overrides
     from scenarios.flight.flight_setup import flight_frames, flight_setup
@@ -136,8 +132,8 @@ def _draw(log: TimingLog, path: Path, rate: int) -> None:
     import matplotlib.pyplot as plt
     import numpy as np
 
-    from rtsim.cli.output import whole_file
     from rtsim.realtime.report import microseconds
+    from rtsim.whole_file import whole_file
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), layout="constrained", sharey=True)
     edges = np.logspace(-1, 5, 121)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.command import Margins
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.units import deg, kt
 
 if TYPE_CHECKING:
@@ -125,10 +125,6 @@ class Corridor:
         The nacelle margins are travels at fixed airspeed to the first angle that violates a boundary, or to the end of
         the travel (0 and 95 deg) where none does. Outside, the one towards the violated boundary is negative: that
         much travel the other way re-enters. Where no nacelle angle would do, both are minus the whole travel.
-
-        Args:
-            airspeed: Airspeed, signed [m/s].
-            nacelle_angle: Nacelle angle [rad].
         """
         from rtsim.corridor.corridor_kernels import MARGIN_COUNT, corridor_margins
 
@@ -137,12 +133,7 @@ class Corridor:
         return Margins(low=out[0].item(), high=out[1].item(), nacelle_forward=out[2].item(), nacelle_aft=out[3].item())
 
     def inside(self, airspeed: float, nacelle_angle: float) -> bool:
-        """Tell whether a point lies inside or on a boundary.
-
-        Args:
-            airspeed: Airspeed, signed [m/s].
-            nacelle_angle: Nacelle angle [rad].
-        """
+        """Tell whether a point lies inside or on a boundary."""
         return bool(self.low_speed(nacelle_angle) <= airspeed <= self.high_speed(nacelle_angle))
 
     def tables(self) -> CorridorTables:
@@ -171,7 +162,6 @@ def load_corridor(name: str = "design", profile: AircraftProfile | None = None) 
     Args:
         name: ``design`` (XV-15: NASA TM X-62407 attitude and stall limits) or ``flight`` (NASA TM 81244 power-on
             stall); the XV-15's share the high-speed side.
-        profile: The aircraft; None: the XV-15.
 
     Raises:
         InputError: There is no such corridor, or a value is missing or out of range.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 LOW, HIGH, NACELLE_FORWARD, NACELLE_AFT = 0, 1, 2, 3
@@ -72,10 +72,6 @@ def boundary_speed(nacelle: FloatArray, speed: FloatArray, angle: float) -> floa
 def most_forward_angle(tables: CorridorTables, airspeed: float) -> float:
     """Smallest nacelle angle at which the airspeed is not below the low-speed boundary.
 
-    Args:
-        tables: The corridor.
-        airspeed: Airspeed, signed [m/s].
-
     Returns:
         The angle [rad]; the aft end of the boundary where the airspeed is below it everywhere.
     """
@@ -92,10 +88,6 @@ def most_forward_angle(tables: CorridorTables, airspeed: float) -> float:
 @inner_kernel
 def most_aft_angle(tables: CorridorTables, airspeed: float) -> float:
     """Largest nacelle angle at which the airspeed is not above the high-speed boundary.
-
-    Args:
-        tables: The corridor.
-        airspeed: Airspeed, signed [m/s].
 
     Returns:
         The angle [rad]; the forward end where the airspeed is above the boundary everywhere.
@@ -123,9 +115,6 @@ def corridor_margins(tables: CorridorTables, airspeed: float, nacelle_angle: flo
     other way, is needed to re-enter. Both are continuous across a boundary.
 
     Args:
-        tables: The corridor.
-        airspeed: Airspeed, signed [m/s].
-        nacelle_angle: Nacelle angle, pi/2 helicopter, 0 airplane [rad].
         out: Filled with low, high [m/s], nacelle forward, nacelle aft [rad]; shape (4,).
     """
     high = boundary_speed(tables.high_nacelle, tables.high_speed, nacelle_angle)
@@ -150,9 +139,7 @@ def corridor_level_step(tables: CorridorTables, margin: float, dt: float, state:
     is the highest active threshold.
 
     Args:
-        tables: The corridor.
         margin: Smaller of the two speed margins [m/s].
-        dt: Length of the frame [s].
         state: Flat state, updated in place; zeros at the start; shape (6,).
 
     Returns:

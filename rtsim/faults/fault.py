@@ -35,7 +35,6 @@ def engine_rating(profile: AircraftProfile, rating: EngineRating) -> float:
     """Power of one engine [W].
 
     Args:
-        profile: The aircraft.
         rating: The rating.
 
     Raises:
@@ -46,9 +45,6 @@ def engine_rating(profile: AircraftProfile, rating: EngineRating) -> float:
 
 def transmission_efficiency(profile: AircraftProfile) -> float:
     """Shaft power of the rotors over engine power.
-
-    Args:
-        profile: The aircraft.
 
     Raises:
         InputError: The value is missing or out of range.
@@ -167,7 +163,6 @@ def fault_events(faults: Sequence[Fault], profile: AircraftProfile | None = None
 
     Args:
         faults: The failures.
-        profile: The aircraft; None: the XV-15.
     """
     return tuple(
         FaultEvent(time, f"{fault.name} {'on' if on else 'off'}", fault.size(profile))

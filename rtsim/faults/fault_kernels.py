@@ -15,7 +15,7 @@ from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import STATE
 from rtsim.aircraft.xv15.dynamics_kernels import commanded_controls
 from rtsim.aircraft.xv15.tables import ControlTables
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 # Kinds, as numbers in the schedule.
@@ -111,7 +111,6 @@ def fault_apply(
     Args:
         state: Fault state, changed in place.
         change: Row of a schedule, shape (SCHEDULE_COLUMNS,).
-        x: Aircraft state.
         nacelle: Conversion actuator: command angle, angle, rate; a jam sets the command angle.
         frequency: Natural frequency of the conversion actuator [rad/s].
         airspeed: What a sound airspeed indicator shows [m/s].
@@ -160,10 +159,8 @@ def fault_update(
     """Let every scheduled failure begin or end that is due at the start of this frame.
 
     Args:
-        tables: Schedule.
         state: Fault state, changed in place.
         time: Time at the start of the frame [s].
-        x: Aircraft state.
         nacelle: Conversion actuator; a jam sets its command angle.
         frequency: Natural frequency of the conversion actuator [rad/s].
         airspeed: What a sound airspeed indicator shows [m/s].
@@ -177,11 +174,7 @@ def fault_update(
 
 @inner_kernel
 def fault_mask(state: FloatArray) -> int:
-    """Give the active failures as a sum of ``MASK_*``.
-
-    Args:
-        state: Fault state.
-    """
+    """Give the active failures as a sum of ``MASK_*``."""
     mask = 0
     if state[F_JAMMED] != 0.0:
         mask |= MASK_JAMMED
@@ -199,11 +192,7 @@ def fault_mask(state: FloatArray) -> int:
 
 @inner_kernel
 def fault_nacelle_ok(state: FloatArray) -> bool:
-    """Tell whether the conversion actuator follows its commands, however slowly.
-
-    Args:
-        state: Fault state.
-    """
+    """Tell whether the conversion actuator follows its commands, however slowly."""
     return state[F_JAMMED] == 0.0
 
 
@@ -212,7 +201,6 @@ def fault_airspeed_error(state: FloatArray, airspeed: float) -> float:
     """Give what the airspeed indication is wrong by [m/s]; exactly 0.0 where it is sound.
 
     Args:
-        state: Fault state.
         airspeed: What a sound indicator shows [m/s].
     """
     if state[F_FROZEN] != 0.0:
@@ -225,7 +213,6 @@ def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
     """Limit the nacelle rate to what the failed conversion actuator can do.
 
     Args:
-        state: Fault state.
         rate: Rate commanded [rad/s].
 
     Returns:
@@ -246,10 +233,7 @@ def collective_rate_limit(
     """Fastest rise of the collective that the governor allows with the power at hand [rad/s]; negative: it must fall.
 
     Args:
-        tables: Governor.
         state: Fault state with a limited engine.
-        x: Aircraft state.
-        nacelle_angle: Nacelle angle [rad].
         power: Shaft power of both rotors now [W].
     """
     along_mast = x[STATE.u] * math.cos(nacelle_angle) - x[STATE.w] * math.sin(nacelle_angle)
@@ -276,14 +260,11 @@ def fault_actuators_begin(
     plant feels differs from the failed motion only by a ripple of zero mean within the frame.
 
     Args:
-        tables: Governor.
-        state: Fault state.
         controls: Gearing, limits and lags of the actuators.
         x: Aircraft state at the start of the step; failed actuators are changed.
         commands: Stick and lever of the step.
         nacelle_angle: Nacelle angle in the middle of the step [rad].
         drive: Shaft power that the rotor-speed governor asks for [W], and whether it is on.
-        dt: Length of the step [s].
         planned: Written: angles of the actuators after the step; NaN where the plant's own are right, shape (3,).
     """
     planned[0] = planned[1] = planned[2] = math.nan

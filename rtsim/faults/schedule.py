@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.faults import fault_kernels as kernels
 from rtsim.faults.fault import ACTUATORS, Fault, FaultKind, fault_changes
 from rtsim.faults.fault_kernels import FaultTables
-from rtsim.frame import FloatArray
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
 KINDS: dict[FaultKind, int] = {
@@ -35,7 +35,6 @@ def fault_change(fault: Fault, *, on: bool, time: float, profile: AircraftProfil
         fault: The failure.
         on: Begins; else ends.
         time: When [s].
-        profile: The aircraft; None: the XV-15.
     """
     channel = 0 if fault.actuator is None else ACTUATORS.index(fault.actuator)
     rate = fault.rate if fault.kind == "actuator-hard-over" and fault.rate is not None else HARD_OVER_RATE
@@ -49,7 +48,6 @@ def fault_tables(faults: Sequence[Fault], profile: AircraftProfile | None = None
 
     Args:
         faults: The failures of a flight, in any order.
-        profile: The aircraft; None: the XV-15.
 
     Raises:
         InputError: A value of the aircraft's governor is missing or out of range.

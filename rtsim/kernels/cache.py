@@ -3,6 +3,9 @@
 numba looks at the source file of a cached function and not at those of the functions it calls, which are compiled into
 it. A kernel that was changed would go on being flown in its old form by its callers. The sources of all kernels, and of
 what they take constants from, are therefore part of the folder's name.
+
+Legend:
+    root: The folder that holds the packages.
 """
 
 from __future__ import annotations
@@ -29,9 +32,6 @@ _IMPORT = re.compile(
 def kernel_sources(root: Path) -> dict[Path, bytes]:
     """Every file that compiled code is made from: the kernels, and what they import of this project.
 
-    Args:
-        root: The folder that holds the packages.
-
     Returns:
         Contents by path. An import inside a function or a ``try`` counts too.
     """
@@ -50,11 +50,7 @@ def kernel_sources(root: Path) -> dict[Path, bytes]:
 
 
 def source_hash(root: Path) -> str:
-    """Hash of everything that compiled code is made from.
-
-    Args:
-        root: The folder that holds the packages.
-    """
+    """Hash of everything that compiled code is made from."""
     digest = hashlib.sha256()
     for path, content in sorted(kernel_sources(root).items()):
         digest.update(path.relative_to(root).as_posix().encode())
@@ -64,9 +60,6 @@ def source_hash(root: Path) -> str:
 
 def cache_folder(root: Path) -> Path | None:
     """The folder for kernels of these sources, made if need be.
-
-    Args:
-        root: The folder that holds the packages.
 
     Returns:
         The folder, or None where the user has chosen another (``NUMBA_CACHE_DIR``) or none can be written.

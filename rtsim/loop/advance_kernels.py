@@ -10,10 +10,11 @@ import math
 
 from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import G_BUSY
 from rtsim.corridor.corridor_kernels import corridor_level_step
 from rtsim.faults.fault_kernels import F_ENGINE, F_POWER, fault_actuators_end, fault_nacelle_rate
-from rtsim.frame import COLUMN, QUANTITY, FloatArray
+from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
@@ -247,11 +248,7 @@ def _turn_systems(flight: Flight) -> None:
 
 @inner_kernel
 def move_reference(flight: Flight) -> None:
-    """Move the filtered airspeed reference and the frame number on.
-
-    Args:
-        flight: The flight.
-    """
+    """Move the filtered airspeed reference and the frame number on."""
     tables, state, dt = flight.tables, flight.state, flight.tables.dt
     time = state.clock[CLOCK.frame] * dt
     wanted = programme_at(tables.programme, PROGRAMME.airspeed, time)
@@ -271,11 +268,7 @@ def move_reference(flight: Flight) -> None:
 
 @inner_kernel
 def faults_act(flight: Flight) -> bool:
-    """Whether this flight has failures, scheduled or thrown in.
-
-    Args:
-        flight: The flight.
-    """
+    """Whether this flight has failures, scheduled or thrown in."""
     return flight.tables.faults.schedule.shape[0] > 0 or flight.state.clock[CLOCK.faults] != 0.0
 
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import importlib
-import math
 import os
 import subprocess
 import sys
@@ -17,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numba
-import numpy as np
 
 from rtsim.kernels import progress
 
@@ -68,7 +65,7 @@ def start(plant: str) -> None:
     with contextlib.suppress(OSError):  # then the flight compiles all of it
         _running.append(
             subprocess.Popen(
-                [sys.executable, "-m", "rtsim.loop.beside", *_wanted],
+                [sys.executable, "-m", "rtsim.loop.compile_beside", *_wanted],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -100,29 +97,3 @@ def _end() -> None:
     for process in _running:
         process.kill()
         process.wait()
-
-
-def main() -> None:
-    """Compile the parts that are not the flight's own half."""
-    from rtsim.kernels.packed import packed
-    from rtsim.loop.data import PART, Flight
-    from rtsim.loop.loading import load_part
-    from rtsim.loop.setup import FlightSetup, build_parts, new_scratch, start_state
-    from rtsim.programme import Programme
-    from rtsim.protection.monitor import compile_watch
-
-    programme = Programme.hold(airspeed=0.0, nacelle_angle=math.pi / 2.0, altitude=100.0)
-    setup = FlightSetup(programme=programme).with_options(protection="monitor")
-    parts = build_parts(setup)
-    state, addresses = start_state(setup, parts, np.zeros(3)), np.zeros(PART.size, dtype=np.int64)
-    flight = packed(Flight(parts.tables, state, new_scratch(parts.tables), np.zeros(0), addresses))
-    for name in ("ask", "advance", "decide"):
-        load_part(flight, name, nonlinear=False)
-    compile_watch()
-    for name in sys.argv[1:]:
-        module, _, function = name.partition(":")
-        getattr(importlib.import_module(module), function)()
-
-
-if __name__ == "__main__":
-    main()

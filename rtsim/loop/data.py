@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from rtsim.aids.aids_kernels import AidTables
 from rtsim.aircraft.xv15.tables import Configuration, ControlTables
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.atmosphere.gust_kernels import GustTables
 from rtsim.choices import PilotMode
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.faults.fault_kernels import FaultTables
-from rtsim.frame import FloatArray
 from rtsim.kernels.packed import Address
 from rtsim.nacelle.automatic_kernels import AutomaticTables
 from rtsim.nacelle.nacelle_kernels import NacelleTables
@@ -23,7 +20,6 @@ from rtsim.protection.law_data import ProtectionTables
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.flap_kernels import FlapTables
 
-IntArray = npt.NDArray[np.int64]
 MODE = Places("mocm", "external", "hold")
 """Who flies, as a number in the clock and in the ``pilot_mode`` column."""
 MODES: dict[PilotMode, int] = MODE.asdict()  # type: ignore[assignment]  # the names above

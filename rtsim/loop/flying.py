@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from rtsim.aircraft.variables import INPUT
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.dryden_kernels import T_ACTIVE
 from rtsim.atmosphere.gust_kernels import NORMALS_PER_FRAME
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import packed
 from rtsim.loop import beside

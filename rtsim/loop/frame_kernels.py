@@ -4,12 +4,20 @@
 only some flights need (plant, pilot, law, aids, air, failures, automatic nacelles, script, measure) are parts, compiled
 on their own and called at their address (``part_kernels``). A frame that needs a part which is not there yet is not
 begun: the loop returns and says which, the caller compiles it and goes on.
+
+Legend:
+    entry: Address of ``fly_frames``.
+    pilot_normals: Standard normals of the pilot's noise, one row per frame; shape (1, 0) without noise.
+    air_normals: Standard normals of the air, one row per frame; shape (1, 0) without turbulence.
+    rows: Written: the frames' rows, one after the other, frames * signals numbers; empty: they are not kept.
+    frames: How many frames.
+    stages: Stages of the first frame; the others are flown whole.
 """
 
 from __future__ import annotations
 
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import G_BUSY
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import batch_kernel, inner_kernel, part
 from rtsim.kernels.parts import call_at
 from rtsim.loop.advance_kernels import (
@@ -42,7 +50,6 @@ def advance(flight: Flight, stages: int, pilot_normals: FloatArray, air_normals:
     """Do the stages of one frame that are asked for.
 
     Args:
-        flight: The flight.
         stages: Which.
         pilot_normals: Standard normals of the pilot's noise in this frame; none: no noise.
         air_normals: Standard normals of the air.
@@ -101,14 +108,6 @@ def fly_frames(
 ) -> float:
     """Fly frames until there are no more, the flight ends, or a part is missing.
 
-    Args:
-        flight: The flight.
-        rows: Written: the frames' rows, one after the other, frames * signals numbers; empty: they are not kept.
-        pilot_normals: Standard normals of the pilot, one row per frame; shape (1, 0) without noise.
-        air_normals: Standard normals of the air, one row per frame; shape (1, 0) without turbulence.
-        frames: How many frames.
-        stages: Stages of the first frame; the others are flown whole.
-
     Returns:
         How many frames were begun, and finished where their last stage was asked for; where a part was missing for the
         next one, -1 less that number.
@@ -140,5 +139,5 @@ def fly_unlocked(
     frames: int,
     stages: int,
 ) -> float:
-    """``fly_frames`` at its address, outside Python's lock, so that threads fly side by side; arguments as there."""
+    """``fly_frames`` at its address, outside Python's lock, so that threads fly side by side."""
     return call_at(entry, flight, rows, pilot_normals, air_normals, frames, stages)

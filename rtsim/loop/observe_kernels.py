@@ -6,11 +6,12 @@ import math
 
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_Q, G_U, G_W
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import corridor_margins
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
-from rtsim.frame import QUANTITY, FloatArray
+from rtsim.frame import QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, TARGET, Flight

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from rtsim.choices import BUILT_IN_PILOT, HAND_PILOT, PASSIVE_LAWS, AidName, CorridorName, OuterLoop, PlantName
-from rtsim.errors import InputError
-from rtsim.plugins import suggestion
+from rtsim.errors import InputError, suggestion
 from rtsim.units import KNOT
 
 _PLUG_IN = r"[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?"

@@ -7,9 +7,9 @@ import math
 from rtsim.aids.aids_kernels import GOVERNOR, aids_airspeed, aids_step
 from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import G_AHEAD, gust_step
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
 from rtsim.loop.data import CHANNEL, CLOCK, MOTION, STATION, TARGET, Flight
@@ -98,7 +98,6 @@ def move_air(flight: Flight, elapsed: float, normals: FloatArray) -> float:
     """Move gusts and turbulence on.
 
     Args:
-        flight: The flight.
         elapsed: Length of the frame before [s].
         normals: Standard normals of the turbulence.
     """

@@ -1,10 +1,21 @@
-"""The two plants as parts of the frame: the same two calls, whichever aircraft flies."""
+"""The two plants as parts of the frame: the same two calls, whichever aircraft flies.
+
+Legend:
+    lpv: Its tables.
+    aircraft: Its tables.
+    x: State; a step overwrites it.
+    angle: Nacelle angle [rad].
+    path: Nacelle motion over the step, shape (3, 3).
+    y: Written: outputs.
+    xdot: Work space; the LPV aircraft needs none.
+    work: Work array.
+"""
 
 from __future__ import annotations
 
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import part
 from rtsim.lpv.lpv_kernels import W_FLAGS, LpvTables, lpv_outputs, lpv_step
 
@@ -19,17 +30,7 @@ def outputs_of_lpv(
     xdot: FloatArray,
     work: FloatArray,
 ) -> float:
-    """Outputs of the LPV aircraft.
-
-    Args:
-        lpv: Its tables.
-        x: State.
-        u: Inputs.
-        angle: Nacelle angle [rad].
-        y: Written: outputs.
-        xdot: Not used.
-        work: Work array.
-    """
+    """Outputs of the LPV aircraft."""
     lpv_outputs(lpv, x, u, angle, y, work)
     return 0.0
 
@@ -44,7 +45,7 @@ def outputs_of_nonlinear(
     xdot: FloatArray,
     work: FloatArray,
 ) -> float:
-    """Outputs of the nonlinear aircraft; arguments as above, ``xdot`` is work space."""
+    """Outputs of the nonlinear aircraft."""
     nonlinear.outputs(aircraft, x, u, angle, y, xdot, work)
     return 0.0
 
@@ -52,14 +53,6 @@ def outputs_of_nonlinear(
 @part
 def step_of_lpv(lpv: LpvTables, x: FloatArray, u: FloatArray, path: FloatArray, dt: float, work: FloatArray) -> float:
     """Advance the LPV aircraft by one step.
-
-    Args:
-        lpv: Its tables.
-        x: State, overwritten.
-        u: Inputs.
-        path: Nacelle motion over the step, shape (3, 3).
-        dt: Length of the step [s].
-        work: Work array.
 
     Returns:
         The flags of ``rtsim.lpv.lpv_kernels``.
@@ -72,6 +65,6 @@ def step_of_lpv(lpv: LpvTables, x: FloatArray, u: FloatArray, path: FloatArray, 
 def step_of_nonlinear(
     aircraft: AircraftTables, x: FloatArray, u: FloatArray, path: FloatArray, dt: float, work: FloatArray
 ) -> float:
-    """Advance the nonlinear aircraft by one step; arguments as above, no flags."""
+    """Advance the nonlinear aircraft by one step; there are no flags."""
     nonlinear.step(aircraft, x, u, path, dt, work)
     return 0.0

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from rtsim.frame import FloatArray  # of arrays, without compiled code: reading a file must stay quick
+from rtsim.arrays import FloatArray
 
 Channel = Literal["stick", "lever", "switch"]
 Shape = Literal["step", "doublet", "sine"]

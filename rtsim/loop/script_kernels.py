@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import KNOT
 
@@ -85,7 +86,6 @@ def warns(shown: FloatArray, row: FloatArray) -> bool:
 
     Args:
         shown: What the airspeed indicator shows, then the margins that go with it [m/s].
-        row: The frame's row.
     """
     warned = min(shown[1], shown[2]) < WARNING_MARGIN
     warned = warned or row[COLUMN.protection_stick_reason] != 0.0

@@ -9,22 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import design_aids, switches_of
 from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
-from rtsim.aircraft import INPUTS, OUTPUTS, STATE, STATES, Condition
+from rtsim.aids.design import design_aids, switches_of
 from rtsim.aircraft.controls import control_tables
-from rtsim.aircraft.variables import AUXILIARY_INPUTS, of_role
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import AUXILIARY_INPUTS, INPUTS, OUTPUTS, STATE, STATES, of_role
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
-from rtsim.atmosphere import CALM, AirSpecification
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import gust_tables, new_gust_state
+from rtsim.atmosphere.specification import CALM, AirSpecification
 from rtsim.choices import CorridorName, PlantName, SwitchName
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
-from rtsim.faults import Fault
+from rtsim.faults.fault import Fault
 from rtsim.faults.schedule import fault_tables, new_fault_state
-from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES, FloatArray
+from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
 from rtsim.loop import beside
@@ -53,10 +54,10 @@ from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables, scheduling_speed
-from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
+from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme, ProgrammePoint
@@ -66,9 +67,9 @@ from rtsim.protection.law_data import LAW_STATE_SIZE, WORK_SIZE, ProtectionTable
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
-from rtsim.systems import load_drive_tables, load_flap_tables
 from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
+from rtsim.systems.settings import load_drive_tables, load_flap_tables
 from rtsim.units import to_deg, to_kt
 
 PLANT_FORMS: dict[PlantName, Form] = {"lpv": "layered", "lpv-plain": "plain", "nonlinear": "layered"}
@@ -139,9 +140,6 @@ def start_trim(nonlinear: bool, database: Database, airspeed: float, nacelle: fl
 
     Args:
         nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
-        database: The LPV aircraft.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
 
     Raises:
         InputError: There is no trim.

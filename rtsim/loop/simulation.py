@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import SWITCHES, switch_of
+from rtsim.aids.design import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
-from rtsim.atmosphere import Gust, Turbulence
+from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import add_gust, set_turbulence
+from rtsim.atmosphere.specification import Gust, Turbulence
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command, Margins, Reference, Sensors
 from rtsim.errors import InputError
-from rtsim.faults import Fault, FaultSwitch
+from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
-from rtsim.frame import QUANTITY, SIGNAL_COUNT, FloatArray
+from rtsim.frame import QUANTITY, SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
 from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState, SimulationTables
 from rtsim.loop.flying import WHOLE, Flying
@@ -127,11 +128,6 @@ class Simulation:
     def database_hash(self) -> str:
         """Hash of the aircraft: of the LPV database and, where it has one of its own, of its profile."""
         return self._parts.database_hash
-
-    @property
-    def outside_grid(self) -> int:
-        """Flags of the last LPV step: 0 inside the grid, else bits as in ``rtsim.lpv.lpv_kernels``."""
-        return int(self._state.clock[CLOCK.flags])
 
     def warm_up(self) -> None:
         """Compile or load what the coming frames need; the state stays untouched."""
@@ -247,7 +243,7 @@ class Simulation:
         """Switch a pilot aid from this frame on; no control steps.
 
         Args:
-            name: One of ``rtsim.aids.SWITCHES``.
+            name: One of ``rtsim.aids.design.SWITCHES``.
             on: On or off.
 
         Raises:

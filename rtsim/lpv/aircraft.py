@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from rtsim.aircraft.points import TrimPoint
 from rtsim.aircraft.variables import position, required_position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, TrimError
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import packed
@@ -25,7 +26,6 @@ from rtsim.units import to_deg, to_kt
 if TYPE_CHECKING:
     import control
 
-FloatArray = npt.NDArray[np.float64]
 
 _DERIVATIVE, _OUTPUTS = interpreted(kernels.lpv_derivative), interpreted(kernels.lpv_outputs)
 TRIM_TOLERANCE = 1e-9
@@ -65,9 +65,7 @@ class LpvAircraft:
         """State derivative.
 
         Args:
-            x: Total state (nx,).
             u: Total input (nu,), nacelle rate and acceleration included.
-            nacelle_angle: Nacelle angle [rad].
 
         Returns:
             The state derivative (nx,).
@@ -81,9 +79,7 @@ class LpvAircraft:
         """Outputs.
 
         Args:
-            x: Total state (nx,).
             u: Total input (nu,), nacelle rate and acceleration included.
-            nacelle_angle: Nacelle angle [rad].
 
         Returns:
             The outputs (ny,).
@@ -111,7 +107,6 @@ class LpvAircraft:
             nacelle_angle: Nacelle angle at the start [rad].
             nacelle_rate: Nacelle rate at the start [rad/s].
             nacelle_acceleration: Nacelle acceleration over the step [rad/s^2].
-            dt: Length of the step [s].
 
         Returns:
             A new array: the state at the end (nx,). ``flags`` tells whether the grid was left.
@@ -130,8 +125,6 @@ class LpvAircraft:
         """Find the level-flight trim of the LPV aircraft itself; at grid points it is the database's.
 
         Args:
-            airspeed: Horizontal airspeed, signed [m/s].
-            nacelle: Nacelle angle [rad].
             acceleration: Level acceleration [m/s^2].
 
         Returns:
@@ -173,10 +166,6 @@ class LpvAircraft:
     def linearize(self, *, airspeed: float, nacelle: float) -> control.StateSpace:
         """Linear model of level flight, interpolated between the grid points.
 
-        Args:
-            airspeed: Horizontal airspeed, signed [m/s].
-            nacelle: Nacelle angle [rad].
-
         Returns:
             The model with named states, inputs and outputs (``control.StateSpace``), in deviations from the trim.
 
@@ -202,10 +191,6 @@ class LpvAircraft:
     def matrices(self, *, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Matrices of the linear model of level flight, interpolated between the grid points.
 
-        Args:
-            airspeed: Horizontal airspeed, signed [m/s].
-            nacelle: Nacelle angle [rad].
-
         Returns:
             A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu).
 
@@ -218,21 +203,11 @@ class LpvAircraft:
         return A, B, C, D
 
     def flap(self, *, airspeed: float, nacelle: float) -> float:
-        """Flap deflection of the schedule, interpolated between the grid points [rad].
-
-        Args:
-            airspeed: Horizontal airspeed, signed [m/s].
-            nacelle: Nacelle angle [rad].
-        """
+        """Flap deflection of the schedule, interpolated between the grid points [rad]."""
         return float(self._interpolate(self.database.flap, airspeed, nacelle))
 
     def is_valid(self, *, airspeed: float, nacelle: float) -> bool:
-        """Whether all grid points around a condition have a level trim.
-
-        Args:
-            airspeed: Horizontal airspeed, signed [m/s].
-            nacelle: Nacelle angle [rad].
-        """
+        """Whether all grid points around a condition have a level trim."""
         d = self.database
         if not (d.airspeed[0] <= airspeed <= d.airspeed[-1] and d.nacelle[0] <= nacelle <= d.nacelle[-1]):
             return False

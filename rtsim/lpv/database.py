@@ -14,17 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.profile import AircraftProfile, borrowed_profile
-from rtsim.aircraft.variables import Variable, with_roles
+from rtsim.aircraft.variables import SCHEDULING_STATES, Variable, position, with_roles
+from rtsim.arrays import BoolArray, FloatArray
 from rtsim.errors import InputError
-from rtsim.lpv.validation import AXES, check_database
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-
+AXES: Final = ("layer_acceleration", "airspeed", "nacelle")
+"""The three axes, in the order of the arrays."""
+MOST_LAYERS: Final = 8
+"""Layers that the kernels' work array has room for."""
 GRIDDED: Final = ("x_ref", "u_ref", "y_ref", "xdot_ref", "A", "B", "C", "D", "df_dnacelle", "valid")
 """Arrays with the leading axes [layer, airspeed, nacelle]."""
-JACOBIAN_BITS: Final = 20
-"""Bits kept of the mantissa of derivatives (6 significant digits); trims are kept in full."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +107,7 @@ class Database:
         object.__setattr__(self, "states", with_roles("state", self.states))
         object.__setattr__(self, "inputs", with_roles("input", self.inputs))
         object.__setattr__(self, "outputs", with_roles("output", self.outputs))
-        check_database(self)
+        _check(self)
 
     def freeze(self) -> None:
         """Make every array read-only, as after loading: a copy from another process has lost that."""
@@ -177,75 +176,72 @@ def _update(digest: hashlib._Hash, name: str, array: npt.NDArray[np.generic]) ->
     digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
 
 
-def round_mantissa(array: FloatArray, bits: int) -> FloatArray:
-    """Round to a number of mantissa bits, so that the rest compresses to nothing.
-
-    Args:
-        array: Any finite float64 array.
-        bits: Bits of the mantissa to keep (of 52).
-
-    Returns:
-        A rounded copy; relative error at most 2**-(bits + 1).
-    """
-    mantissa, exponent = np.frexp(array)
-    scale = float(2 ** (bits + 1))
-    return np.asarray(np.ldexp(np.round(mantissa * scale) / scale, exponent), dtype=np.float64)
+def _expected_shapes(database: Database) -> dict[str, tuple[int, ...]]:
+    """Shapes that the arrays must have, from the axes and the lists of variables."""
+    grid = (database.layer_acceleration.size, database.airspeed.size, database.nacelle.size)
+    nx, nu, ny = len(database.states), len(database.inputs), len(database.outputs)
+    tails: dict[str, tuple[int, ...]] = {
+        "x_ref": (nx,), "u_ref": (nu,), "y_ref": (ny,), "xdot_ref": (nx,), "df_dnacelle": (nx,), "valid": (),
+        "A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu),
+    }  # fmt: skip
+    return {name: grid + tail for name, tail in tails.items()} | {"flap": grid[1:]}
 
 
-def quantized(database: Database) -> Database:
-    """Round the derivatives to six significant digits; trims stay as they are.
-
-    The database in memory and the file then hold the same bits, and the file is small.
-
-    Args:
-        database: A freshly built database.
-
-    Returns:
-        The rounded database.
-    """
-    return replace(
-        database,
-        A=round_mantissa(database.A, JACOBIAN_BITS),
-        B=round_mantissa(database.B, JACOBIAN_BITS),
-        C=round_mantissa(database.C, JACOBIAN_BITS),
-        D=round_mantissa(database.D, JACOBIAN_BITS),
-        df_dnacelle=round_mantissa(database.df_dnacelle, JACOBIAN_BITS),
-    )
-
-
-def fill_invalid(arrays: Mapping[str, npt.NDArray[np.generic]], airspeed: FloatArray, level_layer: int) -> None:
-    """Fill cells without a trim from the nearest valid airspeed of the same layer and nacelle angle, in place.
-
-    State, input, output and derivatives come from the same cell; never from another nacelle angle, since that would
-    mix trims of different configurations. A layer without any trim at a nacelle angle repeats the level layer.
-
-    Args:
-        arrays: Writable gridded arrays by name; ``valid`` says which cells to fill.
-        airspeed: The airspeed axis (V,) [m/s].
-        level_layer: Number of the layer of level flight.
-
-    Raises:
-        InputError: The level layer has no trim at all at some nacelle angle.
-    """
-    valid = np.asarray(arrays["valid"], dtype=bool)
-    holes, sources = [], []
-    for layer, v, nacelle in np.argwhere(~valid):
-        good = np.flatnonzero(valid[layer, :, nacelle])
-        source = int(layer)
-        if not good.size:
-            source = level_layer
-            good = np.flatnonzero(valid[level_layer, :, nacelle])
-        if not good.size:
+def _check(database: Database) -> None:
+    """Refuse a database that the kernels could not fly, naming the array and what is wrong with it."""
+    _check_variables(database)
+    for name in AXES:
+        _check_axis(name, getattr(database, name), shortest=1 if name == "layer_acceleration" else 2)
+    if np.min(np.abs(database.layer_acceleration)) > 1e-9:
+        raise InputError(
+            "there is no layer of level flight",
+            key="layer_acceleration",
+            value=database.layer_acceleration.tolist(),
+            mend="add the layer of zero acceleration",
+        )
+    if database.layer_acceleration.size > MOST_LAYERS:
+        raise InputError("too many layers", key="layer_acceleration",
+                         value=database.layer_acceleration.size, allowed=f"at most {MOST_LAYERS}")  # fmt: skip
+    for name, shape in _expected_shapes(database).items():
+        array = getattr(database, name)
+        if array.shape != shape:
+            raise InputError("wrong shape", key=name, value=array.shape, allowed=f"{shape}")
+        if array.dtype != np.bool_ and not np.all(np.isfinite(array)):
+            where = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
             raise InputError(
-                "no trim at any airspeed",
-                key=f"valid[{level_layer}, :, {nacelle}]",
-                mend="leave this nacelle angle out",
+                "not a finite number",
+                key=f"{name}{list(where)}",
+                value=float(array[where]),
+                mend="mark the cell invalid and fill it from the nearest airspeed that has a trim",
             )
-        holes.append((layer, v, nacelle))
-        sources.append((source, good[np.argmin(np.abs(airspeed[good] - airspeed[v]))], nacelle))
-    if not holes:
-        return
-    into, out_of = tuple(np.transpose(holes)), tuple(np.transpose(sources))
-    for name, array in arrays.items():
-        if name != "valid":
-            array[into] = array[out_of]
+    if not np.isfinite(database.rotor_speed):
+        raise InputError("not a finite number", key="rotor_speed", value=database.rotor_speed)
+    if not database.valid[database.level_layer].any():
+        raise InputError("no cell of the level layer is valid", key="valid")
+
+
+def _check_variables(database: Database) -> None:
+    for kind, variables in (("states", database.states), ("inputs", database.inputs), ("outputs", database.outputs)):
+        names = [variable.name for variable in variables]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError("the same name twice", key=kind, value=name, mend="rename one of them")
+    for name in SCHEDULING_STATES:
+        if position(database.states, name) < 0:
+            raise InputError(
+                f"the state '{name}' is missing, from which airspeed and angle of attack are computed",
+                key="states",
+                value=[variable.name for variable in database.states],
+                mend=f"name the state that means '{name}' so",
+            )
+
+
+def _check_axis(name: str, axis: FloatArray, *, shortest: int) -> None:
+    if axis.ndim != 1 or axis.size < shortest:
+        raise InputError("not an axis", key=name, value=axis.shape, allowed=f"{shortest} or more values")
+    if not np.all(np.isfinite(axis)):
+        raise InputError("not a finite number on the axis", key=name)
+    if np.any(np.diff(axis) <= 0.0):
+        first = int(np.argmax(np.diff(axis) <= 0.0)) + 1
+        raise InputError("the axis does not ascend", key=f"{name}[{first}]", value=float(axis[first]),
+                         mend="sort the axis and the arrays with it")  # fmt: skip

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from rtsim.aircraft.variables import AUXILIARY_INPUTS, FLAP_INPUTS, INPUTS, OUTPUTS, STATES, Variable, position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.lpv.database import Database, FloatArray
+from rtsim.lpv.database import Database
 
 
 @functools.lru_cache(maxsize=4)
@@ -20,10 +21,6 @@ def flown_database(database: Database, file: str | None = None) -> Database:
 
     Variables are found by name, in any order; outputs that nobody asks for are left out. Where inputs of flaps and
     rotor speed are missing, they do nothing.
-
-    Args:
-        database: Any database.
-        file: File it came from, for the message.
 
     Returns:
         The same one where it has that layout; else a copy in it.
@@ -69,20 +66,12 @@ def flown_database(database: Database, file: str | None = None) -> Database:
 
 
 def moves_flaps(database: Database) -> bool:
-    """Whether a database knows what the flaps do.
-
-    Args:
-        database: A database.
-    """
+    """Whether a database knows what the flaps do."""
     return set(FLAP_INPUTS) <= {variable.name for variable in database.inputs}
 
 
 def turns_rotors(database: Database) -> bool:
-    """Whether a database knows what the rotor speed does.
-
-    Args:
-        database: A database.
-    """
+    """Whether a database knows what the rotor speed does."""
     return "rotor_speed" in {variable.name for variable in database.inputs}
 
 

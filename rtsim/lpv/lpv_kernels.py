@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, part
 from rtsim.lpv.schedule_kernels import (
     FLAG_AIRSPEED_HIGH,
@@ -23,7 +24,6 @@ from rtsim.lpv.schedule_kernels import (
     REFRESH_REFERENCE,
     W_BLEND,
     W_FLAGS,
-    FloatArray,
     LpvRoles,
     LpvTables,
     auxiliary_act,
@@ -137,10 +137,7 @@ def lpv_derivative(
     ``work[W_FLAGS]`` collects the flags (bitwise or with what stands there); the caller clears it.
 
     Args:
-        tables: Prepared tables.
-        x: Total state (nx,).
         u: Total input (nu,), nacelle rate and acceleration included.
-        nacelle_angle: Nacelle angle [rad].
         xdot: Receives the state derivative (nx,).
         work: Scratch of ``work_size(tables)`` values.
     """
@@ -169,10 +166,7 @@ def lpv_outputs(
     """Outputs of the LPV aircraft.
 
     Args:
-        tables: Prepared tables.
-        x: Total state (nx,).
         u: Total input (nu,), nacelle rate and acceleration included.
-        nacelle_angle: Nacelle angle [rad].
         y: Receives the outputs (ny,).
         work: Scratch of ``work_size(tables)`` values.
     """
@@ -219,11 +213,9 @@ def lpv_step(
     ``work[W_FLAGS]`` are cleared first and then hold those of all four stages.
 
     Args:
-        tables: Prepared tables.
         x: Total state (nx,); replaced by the state at the end of the step.
         u: Total input (nu,); its nacelle rate and acceleration are ignored, the path's are used.
         nacelle_path: Rows start, middle, end of the step; columns angle [rad], rate [rad/s], acceleration [rad/s^2].
-        dt: Length of the step [s].
         work: Scratch of ``work_size(tables)`` values.
     """
     roles = tables.roles
@@ -298,11 +290,9 @@ def lpv_step_steady(
     Args:
         stepping: The aircraft and its work space.
         x: Total state (nx,); replaced by the state at the end of the step.
-        u: Total input (nu,).
         nacelle_angle: Angle at the start of the step [rad].
         nacelle_rate: Rate at the start of the step [rad/s].
         nacelle_acceleration: Acceleration during the step [rad/s^2].
-        dt: Length of the step [s].
 
     Returns:
         The flags of the step (``FLAG_*``), 0 where all was inside the grid.

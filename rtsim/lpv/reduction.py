@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rtsim.aircraft.variables import RIGID_BODY_STATES, of_role, required_position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 
 
@@ -52,7 +52,6 @@ def settled(
     """Let everything settle but the rigid body and what else is kept.
 
     Args:
-        database: The linear models.
         keep: States that are left, in this order: the rigid body's, which must all be among them, and any others.
         inputs: Inputs that are left, in this order.
         purpose: What for, for messages.
@@ -101,7 +100,6 @@ def refuse_unknown_motion(database: Database, purpose: str) -> None:
     """Refuse a database whose rigid body moves in more ways than the ones that are reckoned with.
 
     Args:
-        database: The linear models.
         purpose: What for, for the message.
 
     Raises:

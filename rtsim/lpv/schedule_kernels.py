@@ -11,14 +11,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.packed import Size
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 FORM_PLAIN = 0
 """The paper's form: linear models interpolated in airspeed and nacelle angle."""
@@ -124,9 +119,6 @@ class LpvTables(NamedTuple):
 def rows_at(tables: LpvTables) -> int:
     """Where the row sums stand in the work array; the scratch vectors follow at ``scratch_at``.
 
-    Args:
-        tables: Prepared tables.
-
     Returns:
         The position.
     """
@@ -136,9 +128,6 @@ def rows_at(tables: LpvTables) -> int:
 @inner_kernel
 def scratch_at(tables: LpvTables) -> int:
     """Where the scratch vectors stand in the work array.
-
-    Args:
-        tables: Prepared tables.
 
     Returns:
         The position.
@@ -150,9 +139,6 @@ def scratch_at(tables: LpvTables) -> int:
 def work_size(tables: LpvTables) -> int:
     """Give the length of the work array that the kernels need.
 
-    Args:
-        tables: Prepared tables.
-
     Returns:
         The number of float64 values.
     """
@@ -161,12 +147,7 @@ def work_size(tables: LpvTables) -> int:
 
 @inner_kernel
 def auxiliary_act(tables: LpvTables, u: FloatArray) -> bool:
-    """Tell whether any of the inputs acts that are zero in most frames; where none does, their columns are left out.
-
-    Args:
-        tables: Prepared tables.
-        u: Total input (nu,).
-    """
+    """Tell whether any of the inputs acts that are zero in most frames; where none does, their columns are left out."""
     act = False
     for k in range(tables.roles.auxiliary, tables.roles.inputs):
         act = act or u[k] != 0.0
@@ -238,10 +219,7 @@ def locate(
     tables are curved, and a gust of 3 m/s at 40 kn would otherwise pitch the aircraft by 2 deg too much.
 
     Args:
-        tables: Prepared tables.
-        x: Total state (nx,).
         inputs: Total input (nu,); its gusts count, where the form knows them.
-        nacelle_angle: Nacelle angle [rad].
         work: Scratch of ``work_size(tables)`` values.
 
     Returns:

@@ -16,6 +16,7 @@ from rtsim.aircraft.variables import (
     position,
     required_position,
 )
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
@@ -24,7 +25,6 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.schedule_kernels import LpvRoles, LpvTables
 from rtsim.units import GRAVITY
 
-FloatArray = npt.NDArray[np.float64]
 Form = Literal["layered", "stitched", "plain"]
 Refresh = Literal["step", "references", "stage"]
 
@@ -48,7 +48,6 @@ def prepare_tables(database: Database, form: Form = "layered", *, refresh: Refre
     """Pack a database for the kernels.
 
     Args:
-        database: Trim map and linear models.
         form: ``layered`` (default), ``stitched`` or the paper's ``plain``.
         refresh: Interpolate once per ``step`` (default), the ``references`` in each Runge-Kutta stage and the matrices
             once, or all in each ``stage``.
@@ -123,11 +122,7 @@ def _prepare(database: Database, form: Form, refresh: Refresh) -> LpvTables:
 
 
 def scheduling_speed(database: Database) -> float:
-    """V0 of the scheduling angle of attack [m/s].
-
-    Args:
-        database: The aircraft.
-    """
+    """V0 of the scheduling angle of attack [m/s]."""
     return database.profile.dimensions.number("scheduling_speed_m_s", low=0.1, high=100.0)
 
 

@@ -12,7 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.kernels.compiled import inner_kernel, part
 from rtsim.loop.data import Flight
 from rtsim.places import Places
@@ -386,7 +387,6 @@ def metrics_step(sums: FloatArray, row: FloatArray, programme: FloatArray, dt: f
         sums: Places ``SUM``, as ``rtsim.measures.metrics.new_sums`` makes them before the first frame.
         row: The finished frame.
         programme: Time, airspeed, nacelle angle, altitude of the programme's points, shape (4, points).
-        dt: Length of the frame [s].
     """
     first = sums[SUM.frames] == 0.0
     # A reset puts the clock back: the jump there is not a motion of the controls.
@@ -425,11 +425,7 @@ def metrics_step(sums: FloatArray, row: FloatArray, programme: FloatArray, dt: f
 
 @part
 def add_metrics(flight: Flight) -> float:
-    """Add the frame that was flown to ``flight.measures``, places ``SUM``; a part of the frame.
-
-    Args:
-        flight: The flight.
-    """
+    """Add the frame that was flown to ``flight.measures``, places ``SUM``; a part of the frame."""
     metrics_step(flight.measures, flight.scratch.row, flight.tables.programme, flight.tables.dt)
     return 0.0
 
@@ -439,9 +435,7 @@ def measure_rows(rows: FloatArray, programme: FloatArray, dt: float, sums: Float
     """Add the frames of a flight that was recorded.
 
     Args:
-        rows: The frame history, shape (frames, signals).
         programme: As for ``metrics_step``.
-        dt: Length of a frame [s].
         sums: Updated in place, places ``SUM``.
     """
     for k in range(rows.shape[0]):

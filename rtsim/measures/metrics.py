@@ -12,11 +12,11 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from rtsim.aircraft.profile import AircraftProfile
+from rtsim.arrays import BoolArray, FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT
 from rtsim.kernels.parts import entry_point
 from rtsim.measures import metric_kernels as kernels
 from rtsim.measures.metric_kernels import CONTROL, FLIGHT, METRICS, SEARCH, SUM, TRIAL, VALUE, Metric
@@ -24,8 +24,6 @@ from rtsim.places import Places
 from rtsim.programme import Programme
 from rtsim.protection.limits import load_limits
 from rtsim.units import to_deg
-
-BoolArray = npt.NDArray[np.bool_]
 
 SECONDARY_LIMITS = ("flapping", "torque", "load_factor", "pitch", "control")
 """Limits besides the corridor, by name: flapping, 1.02 of the torque limit, load factor, pitch, and keeping control to
@@ -177,11 +175,7 @@ def objective_value(figures: FlightFigures, objective: str) -> float:
 
 
 def new_sums(profile: AircraftProfile | None = None) -> FloatArray:
-    """What a flight is measured into: nothing summed up yet, the limits it is judged by in their places.
-
-    Args:
-        profile: The aircraft; None: the XV-15.
-    """
+    """What a flight is measured into: nothing summed up yet, the limits it is judged by in their places."""
     limits, sums = load_limits(profile), np.zeros(SUM.size)
     sums[SUM.flapping_limit], sums[SUM.pitch_limit] = to_deg(limits.flapping), to_deg(limits.pitch)
     sums[SUM.load_limit_max], sums[SUM.load_limit_min] = limits.load_factor_max, limits.load_factor_min
@@ -194,7 +188,6 @@ def finished(sums: FloatArray, dt: float) -> FloatArray:
 
     Args:
         sums: What was summed up, places ``SUM``.
-        dt: Length of a frame [s].
 
     Raises:
         InputError: Not one frame was flown.
@@ -236,8 +229,6 @@ def measured(
     Args:
         rows: The frame history, shape (frames, SIGNAL_COUNT), at least one frame.
         programme: What it was asked to do.
-        dt: Length of a frame [s].
-        profile: The aircraft; None: the XV-15.
         ended: It ended by itself.
         yielded: Its pilot gave up his plan.
 
@@ -257,7 +248,6 @@ def flight_metrics(rows: FloatArray, programme: Programme, dt: float) -> FlightM
     Args:
         rows: The frame history, shape (frames, SIGNAL_COUNT), at least one frame.
         programme: What the scenario asked for.
-        dt: Length of a frame [s].
     """
     return FlightMetrics(measured(rows, programme, dt))
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile
+from rtsim.arrays import FloatArray
 from rtsim.command import Command, Sensors
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.nacelle.automatic_kernels import (
     AUTOMATIC_STATE_SIZE,
     AutomaticTables,
@@ -23,7 +23,7 @@ from rtsim.nacelle.automatic_kernels import (
 )
 from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.programme import Programme
-from rtsim.units import deg, kt, to_deg
+from rtsim.units import deg, to_deg
 
 NOMINAL_RATE = deg(7.5)
 """Rate of the XV-15's conversion actuators [rad/s] (TM 81244)."""
@@ -52,11 +52,7 @@ class NacelleSchedule:
             raise InputError("its nacelle angles must not rise with the airspeed", key="nacelle schedule", value=angles)
 
     def at(self, airspeed: float) -> float:
-        """Nacelle angle at an airspeed [rad]; constant beyond the ends.
-
-        Args:
-            airspeed: Airspeed [m/s].
-        """
+        """Nacelle angle at an airspeed [rad]; constant beyond the ends."""
         return float(np.interp(airspeed, self.airspeed, self.nacelle))
 
 
@@ -68,7 +64,6 @@ def centre_line_schedule(
     Args:
         corridor: Name of the corridor.
         step_deg: Distance of the corners in nacelle angle [deg].
-        profile: The aircraft; None: the XV-15.
     """
     centre = load_corridor(corridor, profile).centre_speed
     corners: list[tuple[float, float]] = []
@@ -185,9 +180,7 @@ class ScheduledNacelle:
         """Give this frame's nacelle rate [rad/s].
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command of this frame; not used.
-            dt: Length of the frame [s].
         """
         if self._command_angle is None or not sensors.nacelle_ok:
             self._command_angle = sensors.nacelle_angle
@@ -196,16 +189,6 @@ class ScheduledNacelle:
         automatic_advance(self._tables, self._state, *seen, rate, dt)
         self._command_angle = min(max(self._command_angle + rate * dt, 0.0), deg(90.0))
         return rate
-
-
-class Table1Nacelle(ScheduledNacelle):
-    """The plug-in law along the corners of the paper's Table 1, at the nominal rate."""
-
-    def __init__(self) -> None:
-        """Begin at rest."""
-        corners = ((0, 90), (24, 82), (40, 82), (61, 75), (80, 75), (105, 50), (130, 50), (150, 0))
-        schedule = NacelleSchedule(tuple(kt(v) for v, _ in corners), tuple(deg(n) for _, n in corners))
-        super().__init__(AutomaticNacelle(schedule))
 
 
 def _array(values: tuple[float, ...]) -> FloatArray:
@@ -219,7 +202,6 @@ __all__ = [
     "AutomaticNacelle",
     "NacelleSchedule",
     "ScheduledNacelle",
-    "Table1Nacelle",
     "centre_line_schedule",
     "inactive_tables",
     "programme_schedule",

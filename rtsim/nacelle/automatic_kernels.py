@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 FILTERED_AIRSPEED, LAST_RATE, STARTED = 0, 1, 2
@@ -47,10 +47,6 @@ class AutomaticTables(NamedTuple):
 def scheduled_angle(tables: AutomaticTables, airspeed: float) -> float:
     """Nacelle angle of the schedule at an airspeed; constant beyond its ends.
 
-    Args:
-        tables: The law.
-        airspeed: Airspeed [m/s].
-
     Returns:
         The angle [rad], on a detent where it is within the zone of one.
     """
@@ -78,12 +74,10 @@ def automatic_rate(
     """Nacelle rate for the frame that starts now; changes no state.
 
     Args:
-        tables: The law.
         state: Its state, shape (3,).
         airspeed: Indicated airspeed [m/s].
         airspeed_rate: Rate of the airspeed [m/s^2].
         angle: Command angle of the conversion actuator [rad].
-        dt: Length of the frame [s].
 
     Returns:
         The rate, aft positive [rad/s].
@@ -108,12 +102,10 @@ def automatic_advance(
     """Advance the law by one frame.
 
     Args:
-        tables: The law.
         state: Its state, updated in place, zeros at the start, shape (3,).
         airspeed: Indicated airspeed at the start of the frame [m/s].
         airspeed_rate: Rate of the airspeed [m/s^2].
         rate: Rate of the actuator's command angle over the frame, as it acted [rad/s].
-        dt: Length of the frame [s].
     """
     if state[2] == 0.0:
         state[0] = airspeed

@@ -3,6 +3,11 @@
 The nacelle angle follows its command angle through a critically damped second-order filter (the paper's filter *is* the
 actuator). Within a frame the command angle is a ramp, for which the filter has a closed form: no integration error,
 and the angle, rate and acceleration at any time within the frame for the stages of an integrator.
+
+Legend:
+    rate: Rate of the command angle over the frame [rad/s].
+    angle: Nacelle angle [rad].
+    command_angle: Command angle of the actuator [rad].
 """
 
 from __future__ import annotations
@@ -11,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 
@@ -57,10 +62,8 @@ def nacelle_effective_rate(tables: NacelleTables, state: FloatArray, rate: float
     """Ramp rate of the command angle over one frame that keeps it within the stops.
 
     Args:
-        tables: The nacelles.
         state: Actuator state, shape (3,).
         rate: Wanted rate, aft positive [rad/s].
-        dt: Length of the frame [s].
 
     Returns:
         The rate that acts [rad/s]: the wanted one, or what still fits before the stop.
@@ -78,9 +81,7 @@ def nacelle_at(tables: NacelleTables, state: FloatArray, rate: float, elapsed: f
     """Motion of the nacelle at a time within the frame, exact for a command ramp.
 
     Args:
-        tables: The nacelles.
         state: Actuator state at the start of the frame, shape (3,).
-        rate: Rate of the command angle over the frame [rad/s].
         elapsed: Time since the start of the frame [s].
         out: Filled with angle [rad], rate [rad/s] and acceleration [rad/s^2]; shape (3,).
     """
@@ -92,10 +93,7 @@ def nacelle_path(tables: NacelleTables, state: FloatArray, rate: float, dt: floa
     """Motion at the start, middle and end of a frame, for the stages of a Runge-Kutta step.
 
     Args:
-        tables: The nacelles.
         state: Actuator state at the start of the frame, shape (3,).
-        rate: Rate of the command angle over the frame [rad/s].
-        dt: Length of the frame [s].
         path: Filled with rows start, middle, end of angle [rad], rate [rad/s], acceleration [rad/s^2]; shape (3, 3).
     """
     nacelle_at(tables, state, rate, 0.0, path[0])
@@ -108,10 +106,8 @@ def nacelle_advance(tables: NacelleTables, state: FloatArray, rate: float, dt: f
     """Advance the actuator by one frame.
 
     Args:
-        tables: The nacelles.
         state: Actuator state, updated in place, shape (3,).
         rate: Rate of the command angle over the frame, from ``nacelle_effective_rate`` [rad/s].
-        dt: Length of the frame [s].
     """
     state[1], state[2], _ = critically_damped_ramp(tables.frequency, state[0], rate, state[1], state[2], dt)
     state[0] += rate * dt
@@ -127,12 +123,7 @@ def nacelle_advance(tables: NacelleTables, state: FloatArray, rate: float, dt: f
 
 @inner_kernel
 def on_downstop(tables: NacelleTables, angle: float) -> bool:
-    """Tell whether the nacelles rest on the airplane-mode stop.
-
-    Args:
-        tables: The nacelles.
-        angle: Nacelle angle [rad].
-    """
+    """Tell whether the nacelles rest on the airplane-mode stop."""
     return angle <= tables.downstop
 
 
@@ -141,7 +132,6 @@ def nacelle_assigned_rate(tables: NacelleTables, wanted: float) -> float:
     """Limit the rate that a scenario or an automatic law asks for.
 
     Args:
-        tables: The nacelles.
         wanted: Rate asked for, aft positive [rad/s].
 
     Returns:
@@ -153,10 +143,6 @@ def nacelle_assigned_rate(tables: NacelleTables, wanted: float) -> float:
 @inner_kernel
 def switch_rate_limit(tables: NacelleTables, command_angle: float) -> float:
     """Rate at which the pilot's switch moves the nacelles here; slow near the stops.
-
-    Args:
-        tables: The nacelles.
-        command_angle: Command angle of the actuator [rad].
 
     Returns:
         The rate, positive [rad/s].
@@ -173,8 +159,6 @@ def next_detent(tables: NacelleTables, command_angle: float, direction: float) -
     """The next angle at which a run in this direction ends: a detent, or the forward stop.
 
     Args:
-        tables: The nacelles.
-        command_angle: Command angle of the actuator [rad].
         direction: -1 forward, 1 aft.
 
     Returns:
@@ -204,11 +188,9 @@ def nacelle_switch_step(
     next detent and no further, held or not; pressing the other way during a run turns it round.
 
     Args:
-        tables: The nacelles.
         switch: Switch state, updated in place, zeros at the start, shape (4,).
         pressed: Below 0 forward, above 0 aft, 0 let go.
         command_angle: Command angle of the actuator at the start of the frame [rad].
-        dt: Length of the frame [s].
 
     Returns:
         The rate of the command angle over the frame, ending exactly on a detent or stop [rad/s].
@@ -250,11 +232,7 @@ def nacelle_switch_step(
 
 
 def new_actuator_state(angle: float) -> FloatArray:
-    """Give the actuator's state at rest, shape (3,).
-
-    Args:
-        angle: Nacelle angle [rad].
-    """
+    """Give the actuator's state at rest, shape (3,)."""
     return np.array([angle, angle, 0.0])
 
 

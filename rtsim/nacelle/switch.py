@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.nacelle.nacelle_kernels import (
     ANGLE,
     COMMAND_ANGLE,
@@ -32,7 +32,6 @@ def load_nacelle_tables(profile: AircraftProfile | None = None, *, extended_aft_
     """Read the data of the nacelles.
 
     Args:
-        profile: The aircraft; None: the XV-15.
         extended_aft_travel: Let the nacelles go to the end of their travel beyond helicopter mode.
 
     Raises:
@@ -105,7 +104,6 @@ class NacelleActuator:
 
         Args:
             rate: Wanted rate of the command angle, aft positive [rad/s].
-            dt: Length of the frame [s].
 
         Returns:
             The rate that acted, reduced where the command met a stop [rad/s].
@@ -140,6 +138,5 @@ class NacelleSwitch:
         Args:
             pressed: -1 forward, 0 let go, 1 aft.
             command_angle: Command angle of the actuator [rad].
-            dt: Length of the frame [s].
         """
         return float(nacelle_switch_step(self.tables, self.state, float(pressed), command_angle, dt))

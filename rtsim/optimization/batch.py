@@ -77,11 +77,7 @@ class BatchFlyer:
                 raise
 
     def fly_one(self, flight: BatchFlight) -> FlightFigures:
-        """Fly one in this thread.
-
-        Args:
-            flight: The flight.
-        """
+        """Fly one in this thread."""
         seed = self.setup.options.seed if flight.seed is None else flight.seed
         setup = dataclasses.replace(self.setup.with_options(seed=seed), programme=flight.programme)
         sums = new_sums(self._parts.database.profile)

@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.optimization.problem import ConversionProblem, Evaluation
 from rtsim.optimization.spec import SearchSpec
 

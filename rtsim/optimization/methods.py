@@ -2,6 +2,13 @@
 
 Every method is a deterministic function of its seed and of what it is told; that is what lets a search resume from its
 record of evaluations. ``ga`` and ``nsga2`` are pymoo's, ``cma-es`` is pycma's.
+
+Legend:
+    objectives: Shape (candidates, objectives).
+    constraints: Shape (candidates, constraints).
+    starts: Start vectors, the best first, shape (starts, variables).
+    population: Candidates per generation.
+    seed: Root of its random stream.
 """
 
 from __future__ import annotations
@@ -10,8 +17,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.random_streams import STREAM_SEARCH, stream_generator
 
 PENALTY_WEIGHT = 10.0
@@ -33,7 +40,6 @@ class SearchMethod(Protocol):
         """Take the worth of the candidates asked for.
 
         Args:
-            objectives: Shape (candidates, objectives).
             constraints: Shape (candidates, constraints); above 0 is a violation.
         """
         ...
@@ -71,12 +77,7 @@ class Penalty:
         self.weight: float | None = None
 
     def __call__(self, objectives: FloatArray, constraints: FloatArray) -> FloatArray:
-        """The penalized objectives, shape of ``objectives``.
-
-        Args:
-            objectives: Shape (candidates, objectives).
-            constraints: Shape (candidates, constraints).
-        """
+        """The penalized objectives, shape of ``objectives``."""
         if self.weight is None:
             self.weight = PENALTY_WEIGHT * float(np.median(np.abs(objectives[:, 0])))
         return objectives + self.weight * total_violation(constraints)[:, None]
@@ -89,9 +90,6 @@ class CmaMethod:
         """Set up.
 
         Args:
-            starts: Start vectors, the best first, shape (starts, variables).
-            population: Candidates per generation.
-            seed: Root of its random stream.
             penalty: Constraints by penalty instead of by rank.
         """
         self._cma = _needed("cma", extra="optimize")
@@ -133,7 +131,6 @@ class CmaMethod:
 
         Args:
             objectives: Shape (candidates, 1).
-            constraints: Shape (candidates, constraints).
         """
         violation = total_violation(constraints)
         if self._penalty is not None:
@@ -165,9 +162,6 @@ class PymooMethod:
 
         Args:
             name: ``ga`` or ``nsga2``.
-            starts: Start vectors, the best first, shape (starts, variables).
-            population: Candidates per generation.
-            seed: Root of its random stream.
             penalty: Constraints by penalty instead of by pymoo's feasibility rules.
             objectives: How many objectives.
             constraints: How many constraints.
@@ -200,12 +194,7 @@ class PymooMethod:
         return np.array(self._asked.get("X"), dtype=np.float64)
 
     def tell(self, objectives: FloatArray, constraints: FloatArray) -> None:
-        """See :class:`SearchMethod`.
-
-        Args:
-            objectives: Shape (candidates, objectives).
-            constraints: Shape (candidates, constraints).
-        """
+        """See :class:`SearchMethod`."""
         from pymoo.core.evaluator import Evaluator
         from pymoo.problems.static import StaticProblem
 
@@ -250,9 +239,6 @@ def make_method(
 
     Args:
         name: ``ga``, ``cma-es`` or ``nsga2``.
-        starts: Start vectors, the best first, shape (starts, variables).
-        population: Candidates per generation.
-        seed: Root of its random stream.
         penalty: Constraints by penalty.
         objectives: How many objectives.
         constraints: How many constraints.

@@ -2,6 +2,11 @@
 
 Each has its name, its source and the acceleration cap at which the nonlinear model stays controlled
 (``docs/optimization.md`` has the flights). The reconversions are the same points backwards.
+
+Legend:
+    nacelle_rate_deg_s: Nacelle rate [deg/s].
+    caps: Acceleration caps.
+    aircraft: The database of another aircraft than the shipped XV-15.
 """
 
 from __future__ import annotations
@@ -15,9 +20,9 @@ import numpy as np
 
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.variables import required_position
-from rtsim.corridor import load_corridor
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.optimization.path import (
     TABLE_1_CAPS,
@@ -76,13 +81,7 @@ def _in_proportion(airspeed_kt: float, aircraft: Database | None) -> float:
 def table_1(
     *, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TABLE_1_CAPS, aircraft: Database | None = None
 ) -> ConversionPath:
-    """The paper's typical conversion (Table 1), its nacelles moving at a constant rate and waiting in between.
-
-    Args:
-        nacelle_rate_deg_s: Nacelle rate [deg/s].
-        caps: Acceleration caps.
-        aircraft: The database of another aircraft than the shipped XV-15.
-    """
+    """The paper's typical conversion (Table 1), its nacelles moving at a constant rate and waiting in between."""
     return path_through(
         "typical",
         "Typical conversion (Table 1)",
@@ -99,11 +98,6 @@ def near_stall(
     """The path pilots tend to fly: along the low-speed side of the corridor (paper, Figure 11).
 
     It follows the power-on stall line of TM 81244 (the corridor ``flight``), which is also where the model stalls.
-
-    Args:
-        nacelle_rate_deg_s: Nacelle rate [deg/s].
-        caps: Acceleration caps.
-        aircraft: The database of another aircraft than the shipped XV-15.
     """
     low = load_corridor("flight", None if aircraft is None else aircraft.profile).low
     corners = [(0.0, 90.0), (_in_proportion(12.0, aircraft), 80.0)]
@@ -126,11 +120,7 @@ def near_stall(
 
 
 def centre_line_corners(aircraft: Database | None = None) -> list[tuple[float, float]]:
-    """The centre line of the design corridor from hover to airplane mode: (airspeed [kn], nacelle angle [deg]).
-
-    Args:
-        aircraft: The database of another aircraft than the shipped XV-15.
-    """
+    """The centre line of the design corridor from hover to airplane mode: (airspeed [kn], nacelle angle [deg])."""
     corridor = load_corridor("design", None if aircraft is None else aircraft.profile)
     corners = [(0.0, 90.0)]
     for nacelle in np.arange(90.0, -_STEP_DEG / 2.0, -_STEP_DEG):
@@ -143,13 +133,7 @@ def centre_line_corners(aircraft: Database | None = None) -> list[tuple[float, f
 def centre_line(
     *, nacelle_rate_deg_s: float = 3.0, caps: AccelerationCaps = TABLE_1_CAPS, aircraft: Database | None = None
 ) -> ConversionPath:
-    """The safest path: the centre line of the corridor at a constant nacelle rate (paper, Figure 13).
-
-    Args:
-        nacelle_rate_deg_s: Nacelle rate [deg/s].
-        caps: Acceleration caps.
-        aircraft: The database of another aircraft than the shipped XV-15.
-    """
+    """The safest path: the centre line of the corridor at a constant nacelle rate (paper, Figure 13)."""
     return path_through(
         "centre_line",
         "Centre line of the corridor at constant nacelle rate",
@@ -174,7 +158,6 @@ def centre_line_variable(
         acceleration_kt_s: Acceleration in conversion [kn/s].
         largest_rate_deg_s: Largest nacelle rate [deg/s]; where it does not do, the acceleration gives way.
         airplane_kt_s: Acceleration in airplane mode [kn/s].
-        aircraft: The database of another aircraft than the shipped XV-15.
     """
     corners = centre_line_corners(aircraft)
     points = [PathPoint(*corners[0])]
@@ -197,9 +180,6 @@ def centre_line_variable(
 @lru_cache(maxsize=4)
 def trim_flapping_map(aircraft: Database | None = None) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The trimmed cyclic flapping over the corridor (paper, Figure 6), from the database.
-
-    Args:
-        aircraft: The database of another aircraft than the shipped XV-15.
 
     Returns:
         Airspeeds [kn], shape (v,); nacelle angles [deg], shape (n,); flapping magnitude [deg], shape (v, n), NaN where
@@ -247,11 +227,6 @@ def fast_side(
 
     From hover it crosses the low-speed ridge at nacelle 90, where the slope is steepest in airspeed; then, at each
     nacelle angle, it stays at the airspeed of least trimmed flapping.
-
-    Args:
-        nacelle_rate_deg_s: Nacelle rate [deg/s].
-        caps: Acceleration caps.
-        aircraft: The database of another aircraft than the shipped XV-15.
     """
     return path_through(
         "fast_side",
@@ -290,7 +265,6 @@ def paper_path(
         name: One of :data:`PATH_NAMES`.
         nacelle_rate_deg_s: Nacelle rate [deg/s]; the variable-rate path takes its largest rate, 12 deg/s, instead.
         reconversion: Flown backwards, at 2 kn/s.
-        aircraft: The database of another aircraft than the shipped XV-15.
 
     Raises:
         InputError: There is no such path.
@@ -313,7 +287,6 @@ def corridor_distance_kt(path: ConversionPath, *, corridor: str = "design", airc
     Args:
         path: The path.
         corridor: Name of the corridor.
-        aircraft: The database of another aircraft than the shipped XV-15.
     """
     programme = path.programme()
     boundaries = load_corridor(corridor, None if aircraft is None else aircraft.profile)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.atmosphere import AirSpecification, Turbulence
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup

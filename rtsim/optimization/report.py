@@ -1,4 +1,8 @@
-"""What a finished search hands to people: the best path as a scenario, beside the paper's paths."""
+"""What a finished search hands to people: the best path as a scenario, beside the paper's paths.
+
+Legend:
+    problem: What was searched.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,6 @@ def best_path(problem: ConversionProblem, result: SearchResult) -> ConversionPat
     """The best path with a description of what it is.
 
     Args:
-        problem: What was searched.
         result: What was found.
     """
     spec = problem.spec
@@ -34,7 +37,6 @@ def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
     """The scenario file of a path found: it flies exactly as the search flew it, but for turbulence and pilot noise.
 
     Args:
-        problem: What was searched.
         path: The path.
     """
     spec = problem.spec
@@ -54,11 +56,7 @@ def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
 
 
 def baseline_summary(problem: ConversionProblem) -> dict[str, dict[str, Any]]:
-    """The paper's paths within the same constraint set: objectives, and whether they keep the limits.
-
-    Args:
-        problem: What was searched.
-    """
+    """The paper's paths within the same constraint set: objectives, and whether they keep the limits."""
     paths = problem.baselines()
     summary: dict[str, dict[str, Any]] = {}
     for (name, path), figures in zip(paths.items(), problem.fly(list(paths.values())), strict=True):
@@ -76,7 +74,6 @@ def nonlinear_check(problem: ConversionProblem, path: ConversionPath) -> FlightF
     """The path flown once in calm air by the nonlinear model, which the search does not use.
 
     Args:
-        problem: What was searched.
         path: The path.
     """
     altitude = problem.spec.flight.altitude_m

@@ -17,11 +17,12 @@ from typing import Protocol
 
 import numpy as np
 
-from rtsim.errors import InputError, OutputError
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.errors import InputError
 from rtsim.optimization.methods import feasibility_order, make_method
 from rtsim.optimization.problem import CONSTRAINTS, ConversionProblem, Evaluation
 from rtsim.optimization.spec import SearchSpec
+from rtsim.whole_file import whole_file
 
 RECORD_FORMAT = 1
 
@@ -125,23 +126,16 @@ class Record:
         if self.path is None:
             return
         sizes = [len(generation.variables) for generation in self.generations]
-        temporary = self.path.with_name(f".{self.path.name}.part")
-        try:
-            with temporary.open("wb") as file:
-                np.savez(
-                    file,
-                    format=RECORD_FORMAT,
-                    fingerprint=self.fingerprint,
-                    sizes=np.array(sizes),
-                    variables=np.concatenate([g.variables for g in self.generations]),
-                    objectives=np.concatenate([g.objectives for g in self.generations]),
-                    constraints=np.concatenate([g.constraints for g in self.generations]),
-                )
-            temporary.replace(self.path)
-        except OSError as error:
-            raise OutputError(f"{self.path}: cannot be written: {error.strerror or error}.") from error
-        finally:
-            temporary.unlink(missing_ok=True)
+        with whole_file(self.path) as temporary, temporary.open("wb") as file:
+            np.savez(
+                file,
+                format=RECORD_FORMAT,
+                fingerprint=self.fingerprint,
+                sizes=np.array(sizes),
+                variables=np.concatenate([g.variables for g in self.generations]),
+                objectives=np.concatenate([g.objectives for g in self.generations]),
+                constraints=np.concatenate([g.constraints for g in self.generations]),
+            )
 
     def _read(self, path: Path) -> None:
         try:

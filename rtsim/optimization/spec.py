@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import Field, create_model
 
 from rtsim.errors import InputError
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.optimization.path import AccelerationCaps
 from rtsim.optimization.paths import FAST_SIDE_CAPS, NEAR_STALL_CAPS, PATH_NAMES
+from rtsim.strict import Strict, checked
+from rtsim.toml_file import read_toml
 
 Objective = Literal[
     "flapping_integral",
@@ -31,18 +32,11 @@ Objective = Literal[
 PathName = Literal["typical", "near_stall", "centre_line", "centre_line_variable", "fast_side"]
 Method = Literal["ga", "cma-es", "nsga2"]
 Handling = Literal["feasibility", "penalty"]
-LARGEST_SPEC_BYTES = 1_000_000
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Cap = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 
 
-class _Strict(BaseModel):
-    """A table of the file: exact types, no unknown keys, read-only."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-class AccelerationTable(_Strict):
+class AccelerationTable(Strict):
     """``[acceleration]``: caps by region; see :class:`rtsim.optimization.path.AccelerationCaps`."""
 
     above_detent_kt_s: Cap = 3.0
@@ -55,7 +49,7 @@ class AccelerationTable(_Strict):
         return AccelerationCaps(self.above_detent_kt_s, self.below_detent_kt_s, self.airplane_kt_s, self.detent_deg)
 
 
-class LimitsTable(_Strict):
+class LimitsTable(Strict):
     """``[limits]``: what a path must keep to; each is a constraint of the search."""
 
     margin_kt: Annotated[float, Field(ge=-20.0, le=60.0)] = 5.0
@@ -67,7 +61,7 @@ class LimitsTable(_Strict):
     mast_torque_inlb: Positive | None = None
 
 
-class SearchTable(_Strict):
+class SearchTable(Strict):
     """``[search]``: how to look for it."""
 
     method: Method = "cma-es"
@@ -80,7 +74,7 @@ class SearchTable(_Strict):
 
 _OPTIONS: Any = create_model(
     "_OPTIONS",
-    __base__=_Strict,
+    __base__=Strict,
     **table_fields(declared()[name] for name in ("plant", "outer_loop", "corridor", "rate_hz", "database")),
 )
 
@@ -91,7 +85,7 @@ class FlightTable(_OPTIONS):  # type: ignore[misc]  # made from the options' dec
     altitude_m: Annotated[float, Field(ge=10.0, le=10_000.0)] = 100.0
 
 
-class RobustTable(_Strict):
+class RobustTable(Strict):
     """``[robust]``: judge each path by several flights in turbulence, all candidates meeting the same air."""
 
     flights: Annotated[int, Field(ge=0, le=1000)] = 0
@@ -105,7 +99,7 @@ class RobustTable(_Strict):
     flapping_deg: Positive = 10.0
 
 
-class SearchSpec(_Strict):
+class SearchSpec(Strict):
     """A whole specification."""
 
     format: Literal[1] = 1
@@ -161,20 +155,10 @@ def load_spec(path: str | Path, changes: Mapping[str, Any] | None = None) -> Sea
     Raises:
         InputError: It does not exist, is no TOML, or has a key or value that is not allowed (the first one found).
     """
-    file = Path(path)
-    try:
-        if file.stat().st_size > LARGEST_SPEC_BYTES:
-            raise InputError("is too large for a specification", file=str(path))
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("does not exist", file=str(path), mend="check the path") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"is not valid TOML: {error}", file=str(path), mend="correct this line") from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+    data = read_toml(path, noun="search specification")
     flight = data.get("flight")
     if isinstance(flight, dict) and isinstance(flight.get("database"), str):  # it lies beside the file
-        flight["database"] = str((file.parent / flight["database"]).resolve())
+        flight["database"] = str((Path(path).parent / flight["database"]).resolve())
     return checked_spec(data, changes, file=str(path))
 
 
@@ -186,18 +170,17 @@ def checked_spec(
     Args:
         data: The tables.
         changes: Values that override them, by key: ``points``, ``search.seed``.
-        file: Where the tables came from, for messages.
 
     Raises:
         InputError: A key or value is not allowed; the first one found.
     """
-    spec = _validated(data, file)
+    spec = checked(SearchSpec, data, file=file)
     if changes:
         whole = spec.model_dump()
         for key, value in changes.items():
             table, _, name = key.rpartition(".")
             (whole[table] if table else whole)[name] = value
-        spec = _validated(whole, None)
+        spec = checked(SearchSpec, whole, file=None)
     if len(set(spec.objectives)) != len(spec.objectives):
         raise InputError("names an objective twice", file=file, key="objectives", value=list(spec.objectives))
     if len(spec.objectives) > 1 and spec.search.method != "nsga2":
@@ -210,20 +193,3 @@ def checked_spec(
             mend="choose nsga2 or one objective",
         )
     return spec
-
-
-def _validated(data: Mapping[str, Any], file: str | None) -> SearchSpec:
-    """Each value on its own; the first one that is not allowed is told."""
-    try:
-        return SearchSpec.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        told = {"extra_forbidden": "is not a key of a search specification", "model_type": "must be a table"}
-        nothing = first["type"] in {"extra_forbidden", "missing"}
-        raise InputError(
-            told.get(first["type"], str(first["msg"]).lower()),
-            file=file,
-            key=".".join(str(part) for part in first["loc"]),
-            value=None if nothing else first["input"],
-            mend="see docs/optimization.md",
-        ) from None

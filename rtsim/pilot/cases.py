@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from rtsim.errors import InputError
 from rtsim.pilot.design import MocmDesign
 from rtsim.pilot.problem import MocmProblem, build_problem
+from rtsim.toml_file import read_toml
 
 DEFAULT_TOLERANCE: dict[str, float] = {
     "g": 1e-4, "T_n": 1e-6, "l_plant": 1e-4, "F_plant": 1e-3, "V_y": 1e-3, "V_u": 1e-3,
@@ -141,12 +141,7 @@ def load_cases(path: str | Path) -> CaseFile:
         InputError: The file cannot be read or is not laid out as a case file.
     """
     shown = str(path)
-    try:
-        document = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=shown, mend="check the path") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"is not valid TOML ({error})", file=shown) from error
+    document = read_toml(path, noun="case")
     cases: list[Case] = []
     kinds: tuple[Literal["case", "reject"], ...] = ("case", "reject")
     for kind in kinds:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.pilot.problem import FloatArray, PadeKind
+from rtsim.arrays import FloatArray
+from rtsim.pilot.problem import PadeKind
 
 SECOND_ORDER_CONSTANT: dict[str, float] = {"pade": 12.0, "taylor": 8.0}
 """k in (s^2 - k s/(2 tau) + k/tau^2) / (s^2 + ...): 12 is the true Pade (2, 2), 8 the truncated series."""

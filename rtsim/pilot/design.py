@@ -9,20 +9,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.arrays import ComplexArray, FloatArray
 from rtsim.errors import InputError
 from rtsim.pilot.estimator import Estimator, InternalModel, design_estimator, internal_model
 from rtsim.pilot.modes import check_modes
-from rtsim.pilot.problem import DEFAULT_MOTOR_NOISE_RATIO, FloatArray, MocmError, MocmProblem, PadeKind, build_problem
+from rtsim.pilot.problem import DEFAULT_MOTOR_NOISE_RATIO, MocmError, MocmProblem, PadeKind, build_problem
 from rtsim.pilot.regulator import DelayedPlant, Regulator, delayed_plant, design_regulator, rate_regulator
-from rtsim.pilot.response import (
-    ComplexArray,
-    Margins,
-    PilotSystem,
-    closed_loop,
-    frequency_response,
-    pilot_margins,
-    pilot_system,
-)
+from rtsim.pilot.response import Margins, PilotSystem, closed_loop, frequency_response, pilot_margins, pilot_system
 
 if TYPE_CHECKING:
     import control

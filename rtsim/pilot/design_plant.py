@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtsim.aircraft.variables import NACELLE_INPUTS, RIGID_BODY_STATES, of_role, position, required_position
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import refuse_unknown_motion, settled
 from rtsim.pilot.layout_kernels import DISPLAYS
-from rtsim.pilot.problem import FloatArray
 from rtsim.pilot.weights import PilotSettings
 
 CONTROLS = ("stick", "lever")
@@ -78,7 +78,6 @@ def plant_layout(database: Database, *, integrators: bool) -> PlantLayout:
     """Find the rigid body and the actuators of each hand among the database's states.
 
     Args:
-        database: The linear models.
         integrators: Append the integrals of airspeed and altitude error.
 
     Returns:
@@ -138,7 +137,6 @@ def design_plant(
     """Build the design plant of one grid point.
 
     Args:
-        database: The linear models.
         layout: Its layout.
         where: Numbers of layer, airspeed and nacelle angle.
         settings: Gusts to reckon with.

@@ -8,13 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
-from rtsim.pilot.layout_kernels import (
-    INTEGRALS,
-    FloatArray,
-    PilotTables,
-    pad4,
-)
+from rtsim.pilot.layout_kernels import INTEGRALS, PilotTables, pad4
 
 
 class Gains(NamedTuple):
@@ -65,7 +61,6 @@ def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
     """Look at an interpolated cell as matrices.
 
     Args:
-        tables: Prepared pilot.
         cell: Interpolated gains.
 
     Returns:
@@ -97,7 +92,6 @@ def rates(
     """Rates of the pilot at held displays.
 
     Args:
-        tables: Prepared pilot.
         gains: Gains of this frame.
         held: What acts constantly.
         at: Estimate, hands and delay filter.
@@ -175,7 +169,6 @@ def limit_hands(tables: PilotTables, gains: Gains, held: Held, at: Motion, trim:
     """Limit rate and travel of the hands at the start of a frame.
 
     Args:
-        tables: Prepared pilot.
         gains: Gains of this frame.
         held: ``limit`` receives what is taken off the hands' rates.
         at: Estimate and hands.
@@ -209,7 +202,6 @@ def motion_of(tables: PilotTables, work: FloatArray) -> Motion:
     """Look at an array as estimate, hands and delay filter.
 
     Args:
-        tables: Prepared pilot.
         work: Array of `motion_size` values.
 
     Returns:
@@ -226,9 +218,6 @@ def motion_of(tables: PilotTables, work: FloatArray) -> Motion:
 def motion_size(tables: PilotTables) -> int:
     """Length of an array for `motion_of`.
 
-    Args:
-        tables: Prepared pilot.
-
     Returns:
         The number of float64 values.
     """
@@ -241,7 +230,6 @@ def held_of(tables: PilotTables, work: FloatArray) -> Held:
     """Look at an array as what acts constantly during a frame.
 
     Args:
-        tables: Prepared pilot.
         work: Array of `held_size` values.
 
     Returns:
@@ -262,9 +250,6 @@ def held_of(tables: PilotTables, work: FloatArray) -> Held:
 @inner_kernel
 def held_size(tables: PilotTables) -> int:
     """Length of an array for `held_of`.
-
-    Args:
-        tables: Prepared pilot.
 
     Returns:
         The number of float64 values.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import allocating_kernel
 from rtsim.pilot.layout_kernels import (
     DISPLAY,
@@ -20,7 +21,6 @@ from rtsim.pilot.layout_kernels import (
     REF_AIRSPEED,
     S_ESTIMATE,
     S_FILTERED,
-    FloatArray,
     PilotTables,
     clip,
     commanded_trim,
@@ -50,10 +50,7 @@ def mocm_engage(
     controls are also what the pilot wants, as far as their limits allow.
 
     Args:
-        tables: Prepared pilot.
         state: The pilot's state, overwritten.
-        x: Aircraft state.
-        nacelle_angle: Nacelle angle [rad].
         nacelle_rate: Nacelle rate [rad/s] (unused: its effect is known from the first frame on).
         reference: What is asked for, see the module.
         present: Stick and lever that act now.

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.linalg import LinAlgError, block_diag
 from scipy.special import erfc
 
-from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem
+from rtsim.arrays import FloatArray
+from rtsim.pilot.problem import MocmError, MocmProblem
 from rtsim.pilot.regulator import DelayedPlant, Regulator
 from rtsim.pilot.riccati import RiccatiFailure, solve_lyapunov, solve_riccati
 

@@ -1,20 +1,20 @@
-"""The scheduled pilot in flat arrays: positions, tables, interpolation, the moving trim and what the pilot sees."""
+"""The scheduled pilot in flat arrays: positions, tables, interpolation, the moving trim and what the pilot sees.
+
+Legend:
+    reference: What is asked for.
+    hand: Number of the hand.
+"""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from rtsim.aircraft.variables import RIGID_BODY_STATES
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.packed import Size
 from rtsim.places import Places
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 REF_AIRSPEED = 0
 """Position in ``reference``: filtered airspeed asked for [m/s]."""
@@ -171,9 +171,6 @@ def pad4(count: int) -> int:
 def pilot_state_size(tables: PilotTables) -> int:
     """Length of the pilot's state array.
 
-    Args:
-        tables: Prepared pilot.
-
     Returns:
         The number of float64 values.
     """
@@ -185,9 +182,6 @@ def pilot_state_size(tables: PilotTables) -> int:
 @inner_kernel
 def noise_width(tables: PilotTables) -> int:
     """Standard normals the pilot takes per frame when its noise is on: one per display and hand.
-
-    Args:
-        tables: Prepared pilot.
 
     Returns:
         The number.
@@ -252,9 +246,6 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
     """Pitch and hands of the commanded trim.
 
     Args:
-        tables: Prepared pilot.
-        reference: What is asked for.
-        nacelle_angle: Nacelle angle [rad].
         out: ``[:1 + nu]`` receives pitch and hands, ``[3 (1 + nu):4 (1 + nu)]`` their slopes with airspeed; the rest
             is scratch.
     """
@@ -275,8 +266,6 @@ def own_reference(state: FloatArray, reference: FloatArray, out: FloatArray) -> 
     """Write what is asked for plus the offset of a capture in progress (zero in ordinary flight).
 
     Args:
-        state: The pilot's state.
-        reference: What is asked for.
         out: Receives airspeed, airspeed rate, altitude and climb rate.
     """
     first = state.shape[0] - OFFSETS
@@ -291,9 +280,6 @@ def observe(
     """Write the deviations of the displays from the reference; the integrals are not among them.
 
     Args:
-        tables: Prepared pilot.
-        x: Aircraft state.
-        reference: What is asked for.
         pitch: Pitch of the moving trim [rad].
         pitch_rate: Its rate [rad/s].
         out: Receives deviations of airspeed, altitude, climb rate, pitch, pitch rate.
@@ -322,8 +308,6 @@ def plant_reference(
     """Write the moving trim in the design plant's states.
 
     Args:
-        tables: Prepared pilot.
-        reference: What is asked for.
         trim: Pitch and hands, from `commanded_trim`.
         pitch_rate: Rate of the trim's pitch [rad/s].
         out: Receives the plant states.
@@ -353,13 +337,11 @@ def outer_command(
     curve, where slower flight takes more power.
 
     Args:
-        tables: Prepared pilot.
         cell: Gains.
         trim: Pitch, hands and their slopes, from `commanded_trim`.
         airspeed: Commanded airspeed [m/s].
         dv: Airspeed command of the outer loop [m/s].
         dh: Altitude command of the outer loop [m].
-        hand: Number of the hand.
 
     Returns:
         The hand's command.
@@ -382,13 +364,7 @@ def outer_command(
 
 @inner_kernel
 def demand(tables: PilotTables, state: FloatArray, hand: int) -> float:
-    """Deviation of a hand's control after the true delay.
-
-    Args:
-        tables: Prepared pilot.
-        state: The pilot's state.
-        hand: Number of the hand.
-    """
+    """Deviation of a hand's control after the true delay."""
     roles = tables.roles
     delay = roles.delay
     hands_at = S_ESTIMATE + roles.plant + delay + roles.hands

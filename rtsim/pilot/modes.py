@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtsim.pilot.problem import FloatArray, MocmError
+from rtsim.arrays import FloatArray
+from rtsim.pilot.problem import MocmError
 from rtsim.pilot.riccati import state_scale
 
 _STABLE_MARGIN = 1e-7

@@ -8,6 +8,11 @@ that starts, ``mocm_advance`` then moves the pilot to the next frame, knowing th
 (m/s, m/s^2, m, m/s, rad/s). Trim and feed-forward follow the *commanded* airspeed and acceleration and the nacelle
 angle.
 The equations stand in docs/pilot.md; sums have a fixed order and no library routine is called.
+
+Legend:
+    reference: What is asked for, see the module.
+    out: Receives stick (-1..1) and lever (0..1).
+    work: Scratch of `pilot_work_size(tables)` numbers.
 """
 
 from __future__ import annotations
@@ -16,6 +21,7 @@ import math
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.pilot.dynamics_kernels import (
     Held,
@@ -52,7 +58,6 @@ from rtsim.pilot.layout_kernels import (
     S_FILTERED,
     S_LIMITED,
     SAME_CONTROL,
-    FloatArray,
     PilotTables,
     clip,
     commanded_trim,
@@ -97,14 +102,9 @@ def mocm_output(
     not reach this output: they act in `mocm_advance`.
 
     Args:
-        tables: Prepared pilot.
-        state: The pilot's state.
         x: Aircraft state (unused, see above).
-        nacelle_angle: Nacelle angle [rad].
         nacelle_rate: Nacelle rate [rad/s] (unused).
-        reference: What is asked for, see the module.
         noise: Standard normals of this frame (unused).
-        out: Receives stick (-1..1) and lever (0..1).
     """
     work = np.empty(4 * (1 + tables.roles.hands) + OFFSETS)
     mocm_output_in(tables, state, nacelle_angle, reference, out, work)
@@ -119,16 +119,7 @@ def mocm_output_in(
     out: FloatArray,
     work: FloatArray,
 ) -> None:
-    """`mocm_output` in given work space.
-
-    Args:
-        tables: Prepared pilot.
-        state: The pilot's state.
-        nacelle_angle: Nacelle angle [rad].
-        reference: What is asked for, see the module.
-        out: Receives stick (-1..1) and lever (0..1).
-        work: Scratch of `pilot_work_size(tables)` numbers.
-    """
+    """`mocm_output` in given work space."""
     own = work[4 * (1 + tables.roles.hands) :]
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, work)
@@ -203,7 +194,6 @@ def mocm_advance(
     """Move the pilot to the start of the next frame: displays read now, held over the frame.
 
     Args:
-        tables: Prepared pilot.
         state: The pilot's state, updated in place.
         x: Aircraft state at the start of the frame.
         nacelle_angle: Nacelle angle at the start of the frame [rad].
@@ -211,7 +201,6 @@ def mocm_advance(
         reference: What is asked for at the start of the frame, see the module.
         applied: Stick and lever that act during the frame, after protection and stops.
         noise: Standard normals, `noise_width` of them, or none: noise off.
-        dt: Length of the frame [s].
     """
     work = np.empty(pilot_work_size(tables))
     mocm_advance_in(tables, state, x, (nacelle_angle, nacelle_rate, dt), reference, applied, noise, work)
@@ -220,9 +209,6 @@ def mocm_advance(
 @inner_kernel
 def pilot_work_size(tables: PilotTables) -> int:
     """Length of the work array that `mocm_output_in` and `mocm_advance_in` need.
-
-    Args:
-        tables: Prepared pilot.
 
     Returns:
         The number of float64 values.
@@ -248,14 +234,11 @@ def mocm_advance_in(
     """`mocm_advance` in given work space. Counting references to its many views would cost more than the arithmetic.
 
     Args:
-        tables: Prepared pilot.
         state: The pilot's state, updated in place.
         x: Aircraft state at the start of the frame.
         scalars: Nacelle angle [rad] and rate [rad/s], length of the frame [s].
-        reference: What is asked for, see the module.
         applied: Stick and lever that act during the frame.
         noise: Standard normals, or none.
-        work: Scratch of `pilot_work_size(tables)` numbers.
     """
     for k in range(work.shape[0]):
         work[k] = 0.0

@@ -13,9 +13,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 
-FloatArray = npt.NDArray[np.float64]
 PadeKind = Literal["pade", "taylor"]
 
 REFUSAL_CODES = (
@@ -61,7 +61,6 @@ class MocmError(InputError):
         Args:
             code: The reason, one of ``REFUSAL_CODES``.
             problem: What is wrong, in a few words without full stop.
-            file: The file it stands in, where there is one.
             key: The field at fault.
             value: The offending value.
             allowed: The allowed range or choices, in words.

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import LinAlgError
 
+from rtsim.arrays import FloatArray
 from rtsim.pilot.delay import DelayFilter, delay_filter
-from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem
+from rtsim.pilot.problem import MocmError, MocmProblem
 from rtsim.pilot.riccati import RiccatiFailure, solve_lyapunov, solve_riccati
 
 _LAG_TOLERANCE = 1e-11

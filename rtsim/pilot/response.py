@@ -6,16 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 from scipy.optimize import brentq
 
+from rtsim.arrays import ComplexArray, FloatArray
 from rtsim.pilot.estimator import Estimator, InternalModel
-from rtsim.pilot.problem import FloatArray, MocmProblem
+from rtsim.pilot.problem import MocmProblem
 from rtsim.pilot.regulator import DelayedPlant, Regulator
 from rtsim.pilot.riccati import solve_lyapunov
-
-ComplexArray = npt.NDArray[np.complex128]
 
 LOWEST_FREQUENCY = 0.01
 """Lower end of the search for crossovers [rad/s]."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import LinAlgError, matrix_balance, solve_continuous_are, solve_continuous_lyapunov
 
-from rtsim.pilot.problem import FloatArray
+from rtsim.arrays import FloatArray
 
 _POLISH_STEPS = 30
 _POLISH_TOLERANCE = 1e-11

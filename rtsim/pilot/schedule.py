@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import OuterLoop
-from rtsim.lpv.database import JACOBIAN_BITS, Database, PilotArrays, round_mantissa
+from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
+from rtsim.lpv.database import Database, PilotArrays
 from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
-from rtsim.pilot.problem import FloatArray, MocmError, MocmProblem, build_problem
+from rtsim.pilot.problem import MocmError, MocmProblem, build_problem
 from rtsim.pilot.weights import PilotSettings, pilot_settings
 
 ARRAYS = ("A", "B", "C", "nacelle_effect", "l", "G2", "F", "V_y", "V_u", "g", "valid")
@@ -171,7 +173,6 @@ def design_schedule(
     """Design the pilot at every valid point of the database's level layer.
 
     Args:
-        database: Trims and linear models.
         outer_loop: How airspeed and altitude are held.
         settings: Weights and noises; None: the aircraft's.
         jobs: Processes to use; the result does not depend on it.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rtsim.aircraft.variables import RIGID_BODY_STATES
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.choices import OuterLoop
 from rtsim.errors import InputError
 from rtsim.kernels.compiled import interpreted
@@ -18,7 +19,6 @@ from rtsim.pilot import layout_kernels as kernels
 from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
 from rtsim.pilot.layout_kernels import PilotRoles, PilotTables, noise_width, pilot_state_size
-from rtsim.pilot.problem import FloatArray
 
 if TYPE_CHECKING:
     from rtsim.pilot.schedule import ScheduledPilot  # which designs pilots, with scipy
@@ -38,9 +38,7 @@ def load_pilot_tables(database: Database, outer_loop: OuterLoop = "integrators",
     """Take a pilot from a database and pack it for the kernels.
 
     Args:
-        database: Trims, linear models and pilot gains.
         outer_loop: How airspeed and altitude are held.
-        dt: Length of a frame [s].
 
     Returns:
         The kernels' tables.
@@ -69,7 +67,6 @@ def pack_pilot(database: Database, pilot: ScheduledPilot, *, dt: float) -> Pilot
     Args:
         database: The trims it follows.
         pilot: Its gains, on the database's axes.
-        dt: Length of a frame [s].
 
     Returns:
         The kernels' tables.
@@ -146,9 +143,7 @@ def _columns(matrix: FloatArray, padded: int) -> FloatArray:
     return filled.reshape(*matrix.shape[:-2], -1)
 
 
-def _pack_cells(
-    pilot: ScheduledPilot, layout: PlantLayout
-) -> tuple[PilotRoles, FloatArray, kernels.IntArray, kernels.IntArray]:
+def _pack_cells(pilot: ScheduledPilot, layout: PlantLayout) -> tuple[PilotRoles, FloatArray, IntArray, IntArray]:
     """Flatten the gains of each cell and note where each section starts."""
     n, hands, displays = pilot.A.shape[-1], pilot.G2.shape[-1], pilot.C.shape[-2]
     estimate = pilot.F.shape[-2]

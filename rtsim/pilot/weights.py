@@ -100,9 +100,6 @@ _NUMBERS = (
 def pilot_settings(profile: AircraftProfile) -> PilotSettings:
     """The settings of an aircraft's pilot.
 
-    Args:
-        profile: The aircraft.
-
     Raises:
         InputError: A value is missing or out of range.
     """

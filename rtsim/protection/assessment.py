@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.protection.monitor import MarginHistory
 
 

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 
 from rtsim.aircraft.variables import required_position
+from rtsim.arrays import FloatArray
 from rtsim.choices import CORRIDOR_NAMES
-from rtsim.corridor import Boundary, Corridor, load_corridor
+from rtsim.corridor.boundaries import Boundary, Corridor, load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import Limits, load_limits
@@ -56,7 +56,6 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
     mast torque passes the limit or the trim ends. Levels and downstop are those of the published corridors.
 
     Args:
-        database: The trims.
         limits: The torque limit; None: the aircraft's.
     """
     limits = load_limits(database.profile) if limits is None else limits
@@ -129,7 +128,6 @@ def guarded_corridor(corridor: Corridor, database: Database, guard: float) -> Co
 
     Args:
         corridor: The chart.
-        database: The plant's trims.
         guard: Distance to keep from the slowest and the fastest trim [m/s].
 
     Returns:
@@ -152,9 +150,6 @@ def trim_range(database: Database) -> tuple[FloatArray, FloatArray]:
     """Slowest and fastest unstalled level trim of each nacelle angle (N,) [m/s].
 
     Where the grid itself ends or was not solved further, the plant sets no limit: minus and plus ``NO_LIMIT``.
-
-    Args:
-        database: The trims.
     """
     from rtsim.lpv.building.grid import conversion_grid
 
@@ -177,7 +172,6 @@ def check_consistency(corridor: Corridor, database: Database, *, tolerance: floa
 
     Args:
         corridor: The chart.
-        database: The plant's trims.
         tolerance: Distances below this are agreement [m/s].
     """
     plant = model_corridor(database)

@@ -103,12 +103,10 @@ class LawChain:
 
         Args:
             laws: The laws in the order in which they act.
-            dt: Length of a frame [s].
             live: The flight runs against the clock: calls that took too long are followed by skipped ones. A batch
                 never skips, so that its commands do not depend on the machine.
             on_event: Told about every event.
             remember: Keep all calls, for ``unrepeatable``.
-            profile: The aircraft; None: the XV-15.
 
         Raises:
             InputError: A law cannot be made.
@@ -211,7 +209,6 @@ class LawChain:
 
         Args:
             frame: Number of the frame.
-            sensors: What the laws may know.
             command: The command before protection.
             margins: Distances to the corridor's boundaries.
         """

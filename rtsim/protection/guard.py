@@ -126,7 +126,6 @@ def guarded_call(
 
     Args:
         law: The law.
-        sensors: What it may know.
         command: The command it may limit.
         margins: Distances to the corridor.
         dt: Time since its last call [s].

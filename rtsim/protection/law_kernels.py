@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
+from rtsim.arrays import FloatArray
 from rtsim.command import SENSOR
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import *  # noqa: F403  # one place to take a law's kernels and its constants from
@@ -78,7 +78,6 @@ def law_start(tables: ProtectionTables, state: FloatArray) -> None:
     """Set the state to that before the first decision.
 
     Args:
-        tables: The law.
         state: Law state, overwritten.
     """
     state[:] = 0.0
@@ -174,9 +173,7 @@ def law_watch(
     """Look ahead and limit nothing: what the law ``monitor`` does.
 
     Args:
-        tables: The law.
         state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        sensors: What the law may know, shape (SENSOR.size,).
         command: Stick, lever, nacelle rate [rad/s] that would act without the law.
         work: Scratch of WORK_SIZE numbers.
     """
@@ -192,9 +189,7 @@ def law_decide(
     """Decide what is allowed until the next decision, by any of the laws.
 
     Args:
-        tables: The law.
         state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        sensors: What the law may know, shape (SENSOR.size,).
         command: Stick, lever, nacelle rate [rad/s] that would act without the law.
         work: Scratch of WORK_SIZE numbers.
     """
@@ -222,7 +217,6 @@ def law_apply(tables: ProtectionTables, state: FloatArray, command: FloatArray, 
     """Limit this frame's command by what was decided last.
 
     Args:
-        tables: The law.
         state: Law state; what acted and why is noted in it.
         command: Stick, lever, nacelle rate [rad/s] without the law.
         applied: Written: the same with the law; may be the same array.
@@ -276,8 +270,6 @@ def law_due(tables: ProtectionTables, state: FloatArray, frame: int) -> bool:
     """Whether the law decides in this frame, and so reads the sensors.
 
     Args:
-        tables: The law.
-        state: Law state.
         frame: Number of the frame.
     """
     return tables.law != LAW_OFF and (frame % tables.every == 0 or state[L_STARTED] == 0.0)
@@ -296,7 +288,6 @@ def protect(
     """One frame of a compiled law.
 
     Args:
-        tables: The law.
         state: Law state, updated in place.
         frame: Number of the frame; the law decides when it is a multiple of ``tables.every``.
         sensors: What the law may know; read only in frames in which it decides.

@@ -93,7 +93,6 @@ class BuiltInLaw:
         """Give the limited command and the interventions of this frame.
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command of this frame.
             margins: Not used: the law has its own boundaries.
             dt: Time since the last call [s].
@@ -180,11 +179,6 @@ class LawSpec:
         """Whether it is one of the built-in laws."""
         return self.name in LAW_NAMES
 
-    @property
-    def compiled_id(self) -> int | None:
-        """Number of a built-in law in compiled code; None for laws written in Python."""
-        return LAW_NAMES.index(self.name) if self.name in LAW_NAMES else None
-
     def make(self) -> ProtectionLaw:
         """Make a fresh law, as every flight begins with.
 
@@ -207,7 +201,7 @@ def load_law(name: str, *, boundary: CorridorName = "flight", database: str = ""
         database: LPV database of the aircraft that a built-in law knows, a file; empty: the shipped XV-15.
 
     Returns:
-        The law; ``make()`` gives a fresh one for a flight, ``compiled_id`` its number for batches.
+        The law; ``make()`` gives a fresh one for a flight.
 
     Raises:
         InputError: There is no such law, or it has no method ``step``.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import (
@@ -52,13 +52,7 @@ from rtsim.protection.prediction_kernels import accelerations, affine, model_at,
 
 @inner_kernel
 def torque_limit(tables: TorqueTables, airspeed: float, nacelle: float) -> float:
-    """Mast-torque limit at a condition [N m].
-
-    Args:
-        tables: The limits.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
-    """
+    """Mast-torque limit at a condition [N m]."""
     if nacelle > tables.takeoff_nacelle and airspeed < tables.takeoff_airspeed:
         return tables.takeoff
     return tables.cruise
@@ -66,13 +60,7 @@ def torque_limit(tables: TorqueTables, airspeed: float, nacelle: float) -> float
 
 @inner_kernel
 def allowed_sink(tables: SinkTables, airspeed: float, altitude: float) -> float:
-    """Sink rate a pilot may fly [m/s].
-
-    Args:
-        tables: The limit.
-        airspeed: Airspeed [m/s].
-        altitude: Height above the ground [m].
-    """
+    """Sink rate a pilot may fly [m/s]."""
     above = max(0.0, altitude - tables.height) / tables.time
     return max(tables.floor, tables.slope * abs(airspeed)) + above
 
@@ -103,7 +91,6 @@ def govern(
     """Bound the nacelle rate: turn back where even stopping leaves the corridor, else scale what the pilot asks for.
 
     Args:
-        tables: The law.
         state: Law state; its nacelle bounds are set.
         cell: The model here.
         z: u, w, q, pitch.
@@ -271,7 +258,6 @@ def blend_recovery(
     """Decide how much of stick and lever the recovery takes, and its controls.
 
     Args:
-        tables: The law.
         state: Law state; blend and recovery controls are set.
         work: The model here, scratch of CELL_SIZE and of ROLL_OUT_SIZE numbers.
         z: u, w, q, pitch.
@@ -279,7 +265,6 @@ def blend_recovery(
         nacelle: Command angle, angle, rate [rad, rad, rad/s].
         pilot_rate: Nacelle rate asked for [rad/s].
         flight: Airspeed [m/s], nacelle angle [rad], climb rate [m/s].
-        altitude: Height above the ground [m].
     """
     cell, target, out = work
     settings = tables.settings
@@ -323,7 +308,6 @@ def limit_stick(
     """Bound the stick so that pitch attitude and, with priority, flapping stay inside.
 
     Args:
-        tables: The law.
         state: Law state; the stick's bounds are set.
         cell: The model here.
         z: u, w, q, pitch.
@@ -373,11 +357,9 @@ def limit_lever(
     """Bound the lever so that the mast torque stays inside, by feedback of the measured torque.
 
     Args:
-        tables: The law.
         state: Law state; the lever's upper bound is set.
         cell: The model here.
         torque: Measured mast torque [N m].
-        airspeed: Airspeed [m/s].
         angle: Nacelle angle [rad].
     """
     settings = tables.settings

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
 from rtsim.protection.monitor_kernels import LIMIT_NUMBERS, LIMIT_WORDS
@@ -37,9 +37,6 @@ class Limits(SimpleNamespace):
 @lru_cache(maxsize=8)
 def load_limits(profile: AircraftProfile | None = None) -> Limits:
     """Give an aircraft's limits.
-
-    Args:
-        profile: The aircraft; None: the XV-15.
 
     Raises:
         InputError: A value is missing or out of range.
@@ -94,9 +91,6 @@ class LimitLevels:
 def load_levels(profile: AircraftProfile | None = None) -> LimitLevels:
     """Give the levels of an aircraft's limits.
 
-    Args:
-        profile: The aircraft; None: the XV-15.
-
     Raises:
         InputError: A value is missing or out of range.
     """
@@ -123,9 +117,6 @@ def load_levels(profile: AircraftProfile | None = None) -> LimitLevels:
 def load_weights(profile: AircraftProfile | None = None) -> RegulatorWeights:
     """Give the weights of the recovery's regulator.
 
-    Args:
-        profile: The aircraft; None: the XV-15.
-
     Raises:
         InputError: A value is missing or out of range.
     """
@@ -144,7 +135,6 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
     """Give the numbers of the built-in laws.
 
     Args:
-        profile: The aircraft; None: the XV-15.
         dt: Length of a frame [s]; the time between decisions is a whole number of frames.
 
     Raises:
@@ -187,12 +177,7 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
 
 
 def frames_per_decision(profile: AircraftProfile | None = None, *, dt: float) -> int:
-    """Frames from one decision of a law to the next.
-
-    Args:
-        profile: The aircraft; None: the XV-15.
-        dt: Length of a frame [s].
-    """
+    """Frames from one decision of a law to the next."""
     return max(1, round(1.0 / (_part(profile).table("law").number("rate_hz", low=1.0, high=1000.0) * dt)))
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rtsim.aircraft.variables import required_position
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.reduction import settle, settled
-from rtsim.nacelle import load_nacelle_tables
+from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.protection import prediction_kernels as kernels
 from rtsim.protection.prediction_kernels import ModelTables
 from rtsim.units import GRAVITY
@@ -45,7 +45,6 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
     Rotor and actuator states settle within 0.2 s and are replaced by their settled values.
 
     Args:
-        database: Trims and linear models.
         weights: Weights of the recovery's regulator.
 
     Returns:

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
 from rtsim.command import SENSOR, Command, Sensors
-from rtsim.corridor import LEVEL_NAMES
-from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES, FloatArray
+from rtsim.corridor.boundaries import LEVEL_NAMES
+from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
@@ -79,7 +80,6 @@ class MarginWatch:
         Args:
             tables: Limits and levels for the kernels.
             limits: The levels for people.
-            dt: Length of a frame [s].
         """
         self.limits = limits
         """Unit and levels of each limit."""
@@ -130,7 +130,6 @@ class MarginMonitor:
         Args:
             boundary: The corridor to watch.
             database: The aircraft of the prediction and of the consistency margin; None: the shipped XV-15.
-            dt: Length of a frame [s].
         """
         database = load_database() if database is None else database
         self.dt = dt
@@ -224,20 +223,12 @@ def compile_watch() -> None:
 
 
 def sensor_array(sensors: Sensors) -> FloatArray:
-    """Sensor values as the kernels take them, shape (SENSOR.size,).
-
-    Args:
-        sensors: The sensor values.
-    """
+    """Sensor values as the kernels take them, shape (SENSOR.size,)."""
     return np.array([float(getattr(sensors, name)) for name in Sensors.__slots__])
 
 
 def sensors_of_rows(rows: FloatArray) -> FloatArray:
-    """Sensor values of a frame history (frames).
-
-    Args:
-        rows: Frame history (frames, SIGNAL_COUNT).
-    """
+    """Sensor values of a frame history (frames)."""
     places = [getattr(QUANTITY, SHOWN_AS.get(name, name)) for name in Sensors.__slots__ if name != "nacelle_ok"]
     sensors = np.empty((len(rows), SENSOR.size))
     sensors[:, : len(places)] = rows[:, places] * UNIT_SCALES[places]

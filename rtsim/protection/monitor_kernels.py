@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import CorridorTables
-from rtsim.frame import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.places import Places
 from rtsim.protection.law_data import (
@@ -93,7 +93,6 @@ def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: flo
     """Signed distance to every limit, positive inside.
 
     Args:
-        tables: The limits.
         sensors: What is known, order of ``rtsim.command.Sensors``.
         time_to_limit: Predicted time to the corridor's boundary [s].
         out: Written, shape (KIND.size,): m/s for speeds, rad and rad/s for angles, share of the limit for torque.
@@ -124,9 +123,7 @@ def levels_step(tables: MonitorTables, margins: FloatArray, dt: float, state: Fl
     Each threshold has its own timer, as in ``rtsim.corridor``.
 
     Args:
-        tables: The levels.
         margins: From ``limit_margins``.
-        dt: Length of the frame [s].
         state: Updated in place, zeros at the start, shape (LEVEL_STATE_SIZE,).
         levels: Written: 0 clear, 1 caution, 2 warning, 3 exceedance, shape (KIND.size,).
     """
@@ -165,8 +162,6 @@ def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) ->
     For displays and ranking; laws use the speed margins.
 
     Args:
-        tables: The corridor.
-        airspeed: Airspeed [m/s].
         angle: Nacelle angle [rad].
 
     Returns:
@@ -201,10 +196,8 @@ def watch(
     """Monitor consecutive frames.
 
     Args:
-        tables: Limits and levels.
         sensors: One row per frame, shape (frames, SENSOR.size).
         time_to_limit: One per frame (frames,) [s].
-        dt: Length of a frame [s].
         state: Of the levels, updated in place, zeros at the start of a flight (LEVEL_STATE_SIZE,).
         margins: Written (frames, KIND.size).
         levels: Written (frames, KIND.size).
@@ -219,7 +212,6 @@ def distances(tables: MonitorTables, sensors: FloatArray, distance: FloatArray) 
     """Normalized distance over a whole flight.
 
     Args:
-        tables: The corridor.
         sensors: One row per frame, shape (frames, SENSOR.size).
         distance: Written (frames,).
     """

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import GRAVITY
 
@@ -82,7 +82,6 @@ def speed_range(tables: BoundaryTables, angle: float) -> tuple[float, float]:
     """Lowest and highest allowed airspeed at a nacelle angle [m/s].
 
     Args:
-        tables: The boundaries.
         angle: Nacelle angle [rad].
     """
     place = min(max(angle / tables.spacing, 0.0), tables.low.shape[0] - 1.000001)
@@ -112,9 +111,6 @@ def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArr
     """Interpolate the model, bilinear; outside the grid the nearest point holds.
 
     Args:
-        tables: The models.
-        airspeed: Horizontal airspeed [m/s].
-        nacelle: Nacelle angle [rad].
         out: Written: one cell, shape (CELL_SIZE,).
     """
     i = _cell_below(tables.airspeed, airspeed)

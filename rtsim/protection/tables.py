@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rtsim.choices import CorridorName
-from rtsim.corridor import Corridor
+from rtsim.corridor.boundaries import Corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.protection.boundary import guarded_corridor, load_boundary
@@ -36,8 +36,6 @@ def law_tables(
 
     Args:
         law: ``off``, ``monitor``, ``governor`` or ``full``.
-        database: The aircraft the law knows.
-        dt: Length of a frame [s].
         boundary: The corridor it keeps to; its low side is tightened to what the plant can trim.
         settings: The law's numbers; None: the aircraft's.
 

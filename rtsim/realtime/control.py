@@ -41,7 +41,7 @@ SPEED_RANGE = (0.001, 1000.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class ControlRequest:
     """One thing asked of the executive; it is served before the next frame."""
 
     action: Action
@@ -63,7 +63,7 @@ class FlightControl:
     """
 
     def __init__(self) -> None:
-        self.requests: deque[Request] = deque()
+        self.requests: deque[ControlRequest] = deque()
         """What has been asked and not served yet."""
         self.paused = False
         """Whether the flight stands still."""
@@ -74,15 +74,15 @@ class FlightControl:
 
     def pause(self) -> None:
         """Stand still after the frame that is being flown."""
-        self.requests.append(Request("pause"))
+        self.requests.append(ControlRequest("pause"))
 
     def resume(self) -> None:
         """Go on after a pause."""
-        self.requests.append(Request("resume"))
+        self.requests.append(ControlRequest("resume"))
 
     def toggle_pause(self) -> None:
         """Pause, or go on."""
-        self.requests.append(Request("toggle-pause"))
+        self.requests.append(ControlRequest("toggle-pause"))
 
     def step(self, frames: int = 1) -> None:
         """Fly a number of frames at the present speed, then pause.
@@ -92,7 +92,7 @@ class FlightControl:
         """
         if frames < 1:
             raise InputError("must be at least 1", key="frames", value=frames, mend="give a whole number from 1")
-        self.requests.append(Request("step", number=frames))
+        self.requests.append(ControlRequest("step", number=frames))
 
     def set_speed(self, speed: float) -> None:
         """Change the speed of the flight.
@@ -100,19 +100,19 @@ class FlightControl:
         Args:
             speed: Multiple of real time, 0.001 to 1000, or infinity for as fast as possible.
         """
-        self.requests.append(Request("speed", number=checked_speed(speed)))
+        self.requests.append(ControlRequest("speed", number=checked_speed(speed)))
 
     def faster(self) -> None:
         """Take the next higher warp step."""
-        self.requests.append(Request("faster"))
+        self.requests.append(ControlRequest("faster"))
 
     def slower(self) -> None:
         """Take the next lower warp step."""
-        self.requests.append(Request("slower"))
+        self.requests.append(ControlRequest("slower"))
 
     def reset(self) -> None:
         """Put the aircraft back to its start; the flight goes on from there."""
-        self.requests.append(Request("reset"))
+        self.requests.append(ControlRequest("reset"))
 
     def set_pilot(self, pilot: str = "next") -> None:
         """Hand the controls over.
@@ -128,20 +128,20 @@ class FlightControl:
             raise InputError(
                 "is not a pilot", key="pilot", value=pilot, allowed=", ".join(PILOT_CHOICES), mend="choose one"
             )
-        self.requests.append(Request("pilot", text=pilot))
+        self.requests.append(ControlRequest("pilot", text=pilot))
 
     def override_protection(self) -> None:
         """Take the authority from the protection law, which goes on watching, or give it back."""
-        self.requests.append(Request("override"))
+        self.requests.append(ControlRequest("override"))
 
     def switch_aid(self, name: str, *, on: bool | None = None) -> None:
         """Switch a pilot aid; one that there is not, or that this flight needs, is refused by an event.
 
         Args:
-            name: One of ``rtsim.aids.SWITCHES``.
+            name: One of ``rtsim.aids.design.SWITCHES``.
             on: On or off; None switches it over.
         """
-        self.requests.append(Request("aid", text=name, on=on))
+        self.requests.append(ControlRequest("aid", text=name, on=on))
 
     def set_flaps(self, angle: float) -> None:
         """Send the flaps to a setting; they no longer follow their schedule.
@@ -149,7 +149,7 @@ class FlightControl:
         Args:
             angle: Flap deflection [rad]; one outside the travel is refused by an event.
         """
-        self.requests.append(Request("flaps", number=angle))
+        self.requests.append(ControlRequest("flaps", number=angle))
 
     def step_flaps(self, step: int) -> None:
         """Send the flaps to the next published setting.
@@ -157,7 +157,7 @@ class FlightControl:
         Args:
             step: 1 down (more flap), -1 up.
         """
-        self.requests.append(Request("step-flaps", number=step))
+        self.requests.append(ControlRequest("step-flaps", number=step))
 
     def trim_throttle(self, share: float) -> None:
         """Trim the throttle, which acts while the rotor-speed governor is off.
@@ -165,7 +165,7 @@ class FlightControl:
         Args:
             share: Engine power to add, as a share of full power; one out of range is refused by an event.
         """
-        self.requests.append(Request("throttle", number=share))
+        self.requests.append(ControlRequest("throttle", number=share))
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend.
@@ -173,7 +173,7 @@ class FlightControl:
         Args:
             change: A gust, another severity of the turbulence, or a failure with whether it begins or ends.
         """
-        self.requests.append(Request("disturb", change=change))
+        self.requests.append(ControlRequest("disturb", change=change))
 
     def stop(self, reason: str = "stopped by the user") -> None:
         """End the flight cleanly after the frame that is being flown.
@@ -181,7 +181,7 @@ class FlightControl:
         Args:
             reason: Why, as a sentence without full stop; it becomes the end reason.
         """
-        self.requests.append(Request("stop", text=reason))
+        self.requests.append(ControlRequest("stop", text=reason))
 
 
 def checked_speed(speed: float) -> float:

@@ -18,9 +18,10 @@ from typing import Protocol
 
 import numpy as np
 
-from rtsim.frame import TIMING_SIGNALS, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import TIMING_SIGNALS
 from rtsim.realtime.clock import wait_until
-from rtsim.realtime.control import FlightControl, Request, checked_speed, neighbouring_warp
+from rtsim.realtime.control import ControlRequest, FlightControl, checked_speed, neighbouring_warp
 from rtsim.realtime.policy import OverrunPolicy
 from rtsim.realtime.report import Ending, Spread, TimingLog, TimingReport, microseconds
 from rtsim.realtime.source import FrameSource
@@ -47,7 +48,6 @@ class FrameSink(Protocol):
 
         Args:
             row: The frame, shape (SIGNAL_COUNT,); copy what is kept.
-            timing: Timing columns of the frame before, shape (TIMING_SIGNALS,).
         """
         ...
 
@@ -61,11 +61,7 @@ class FrameSink(Protocol):
         ...
 
     def block(self, rows: FloatArray) -> None:
-        """Show and keep rows of a flight that is not paced; may wait, so that nothing is lost.
-
-        Args:
-            rows: The frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Show and keep rows of a flight that is not paced; may wait, so that nothing is lost."""
         ...
 
 
@@ -167,7 +163,7 @@ class Executive:
             self._steps_left -= flown
             if self._steps_left <= 0:
                 self._steps_left = -1
-                self.control.requests.appendleft(Request("pause"))
+                self.control.requests.appendleft(ControlRequest("pause"))
 
     def _serve_requests(self) -> bool:
         """Do what was asked since the last frame; stand still while paused.
@@ -198,7 +194,7 @@ class Executive:
             self._begin_section(now)
         return self._ending == "finished"
 
-    def _serve(self, request: Request) -> None:
+    def _serve(self, request: ControlRequest) -> None:
         action, control = request.action, self.control
         if action == "toggle-pause":
             action = "resume" if control.paused else "pause"
@@ -220,7 +216,7 @@ class Executive:
         else:
             self._pass_on(request)
 
-    def _pass_on(self, request: Request) -> None:
+    def _pass_on(self, request: ControlRequest) -> None:
         """Ask the source for what only it can do."""
         action, source = request.action, self.source
         if action == "pilot":

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 
 Ending = Literal["finished", "stopped", "overruns"]
 """Why the loop ended: the source had no more frames, it was asked to, or the overrun policy said so."""

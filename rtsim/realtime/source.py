@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 
 if TYPE_CHECKING:
     from rtsim.loop.simulation import Disturbance

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 from rtsim.command import Command, StickInput
-from rtsim.nacelle import NacelleSwitch, NacelleTables, load_nacelle_tables
-from rtsim.nacelle.nacelle_kernels import switch_rate_limit
+from rtsim.nacelle.nacelle_kernels import NacelleTables, switch_rate_limit
+from rtsim.nacelle.switch import NacelleSwitch, load_nacelle_tables
 from rtsim.sticks.settings import StickSettings, shaped
 from rtsim.sticks.transition import TO_AIRPLANE, TO_HELICOPTER, TransitionSchedule
 
@@ -175,7 +175,6 @@ class StickHandler:
             sticks: The newest stick input.
             age: Time since it arrived [s].
             situation: The aircraft.
-            dt: Length of the frame [s].
         """
         settings = self.settings
         fresh = sticks.sequence > 0 and age <= settings.loss_time

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.corridor import Corridor
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import Corridor
 from rtsim.units import deg
 
 TO_HELICOPTER, TO_AIRPLANE = 3, 4
@@ -43,7 +43,6 @@ class TransitionSchedule:
 
         Args:
             direction: ``TO_HELICOPTER`` or ``TO_AIRPLANE``.
-            airspeed: Airspeed [m/s].
         """
         if direction == TO_AIRPLANE:
             return float(np.interp(airspeed, self.forward_airspeed, self.forward_angle))

@@ -4,13 +4,16 @@ With the governor on, the engines give whatever holds the rotor speed: it is exa
 With the governor off, engine power follows the throttle, which moves with the power lever, and the rotors turn as fast
 as power and torque let them. Rotor speed is an input of the aircraft, as the nacelle angle is: the acceleration of the
 shaft does nothing else to an aircraft with two rotors that turn in opposite directions.
+
+Legend:
+    needed: Shaft power that the rotors take [W].
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 DEVIATION, ENGINE_POWER, THROTTLE_OFFSET, GOVERNED, THROTTLE_TRIM = 0, 1, 2, 3, 4
@@ -50,7 +53,6 @@ def throttle_power(tables: DriveTables, lever: float) -> float:
     """Shaft power of both engines at a power lever by the throttle's law [W].
 
     Args:
-        tables: The drive.
         lever: Power lever, 0 to 1.
     """
     last = tables.lever.shape[0] - 1
@@ -64,24 +66,13 @@ def throttle_power(tables: DriveTables, lever: float) -> float:
 
 @inner_kernel
 def engine_power(state: FloatArray, needed: float) -> float:
-    """Shaft power that the engines give now [W].
-
-    Args:
-        state: Drive state.
-        needed: Shaft power that the rotors take [W].
-    """
+    """Shaft power that the engines give now [W]."""
     return needed if state[GOVERNED] != 0.0 and state[DEVIATION] == 0.0 else state[ENGINE_POWER]
 
 
 @inner_kernel
 def governor_power(tables: DriveTables, state: FloatArray, needed: float) -> float:
-    """Shaft power with which the governor would hold the rotor speed, or bring it back [W].
-
-    Args:
-        tables: The drive.
-        state: Drive state.
-        needed: Shaft power that the rotors take [W].
-    """
+    """Shaft power with which the governor would hold the rotor speed, or bring it back [W]."""
     speed = tables.governed_speed + state[DEVIATION]
     return float(needed - tables.inertia * speed * state[DEVIATION] / tables.recovery)
 
@@ -97,13 +88,11 @@ def drive_advance(
     not suffice.
 
     Args:
-        tables: The drive.
         state: Drive state, changed in place.
         governed: Whether the governor is on.
         torque: Torque of both masts together [N m].
         lever: Power lever that acts, 0 to 1.
         available: Largest shaft power of both engines [W].
-        dt: Length of the frame [s].
     """
     speed = tables.governed_speed + state[DEVIATION]
     needed = torque * speed

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rtsim.aircraft.variables import INPUT
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 FLAP, FLAP_FOLLOWS, FLAP_SETTING = 0, 1, 2
@@ -38,7 +38,6 @@ def flap_now(state: FloatArray, schedule: float) -> float:
     """Deflection at the start of the frame [rad].
 
     Args:
-        state: Flap state.
         schedule: Deflection of the schedule [rad].
     """
     return schedule if state[FLAP_FOLLOWS] != 0.0 else state[FLAP]
@@ -49,11 +48,9 @@ def flap_advance(tables: FlapTables, state: FloatArray, automatic: bool, schedul
     """Move the flaps over one frame.
 
     Args:
-        tables: The flaps.
         state: Flap state, changed in place.
         automatic: Whether they follow the schedule, or else go to their setting.
         schedule: Deflection of the schedule at the start of the frame [rad].
-        dt: Length of the frame [s].
     """
     present = flap_now(state, schedule)
     most = tables.rate * dt
@@ -74,7 +71,6 @@ def flap_parts(tables: FlapTables, present: float, expected: float, out: FloatAr
     """Split a difference of two deflections into its parts in the intervals between settings.
 
     Args:
-        tables: The flaps.
         present: One deflection [rad].
         expected: The one it is compared with [rad].
         out: Written: the parts, shape (3,) [rad].
@@ -90,8 +86,6 @@ def flap_inputs(tables: FlapTables, state: FloatArray, schedule: float, u: Float
     """Write the aircraft's flap inputs: exactly zero while the flaps follow the schedule.
 
     Args:
-        tables: The flaps.
-        state: Flap state.
         schedule: Deflection of the schedule [rad].
         u: Inputs of the aircraft; those of the flaps are written.
     """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.systems.drive_kernels import THROTTLE_TRIM
 from rtsim.systems.flap_kernels import FLAP_SETTING, FlapTables, flap_now
 from rtsim.units import deg, to_deg
@@ -18,7 +18,6 @@ def check_flap_setting(tables: FlapTables, angle: float) -> None:
     """Refuse a setting that the flaps cannot go to.
 
     Args:
-        tables: The flaps.
         angle: Flap deflection [rad].
 
     Raises:
@@ -39,7 +38,6 @@ def flap_setting(state: FloatArray, scheduled: float) -> float:
     """Deflection that the flaps go to or stand at [rad].
 
     Args:
-        state: Flap state.
         scheduled: Deflection of the schedule [rad].
     """
     setting = float(state[FLAP_SETTING])
@@ -50,7 +48,6 @@ def next_flap_setting(tables: FlapTables, present: float, step: int) -> float:
     """The published setting beyond a deflection [rad]; beyond the last one, that one.
 
     Args:
-        tables: The flaps.
         present: A deflection [rad].
         step: 1 down (more flap), -1 up.
     """

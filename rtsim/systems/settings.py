@@ -17,9 +17,6 @@ ROTORS = 2
 def load_flap_tables(profile: AircraftProfile | None = None) -> FlapTables:
     """The flaps of an aircraft.
 
-    Args:
-        profile: The aircraft; None: the XV-15.
-
     Raises:
         InputError: A value is missing or out of range.
     """
@@ -31,9 +28,6 @@ def load_flap_tables(profile: AircraftProfile | None = None) -> FlapTables:
 
 def all_engines_power(profile: AircraftProfile | None = None) -> float:
     """Power of all engines at their highest rating [W].
-
-    Args:
-        profile: The aircraft; None: the XV-15.
 
     Raises:
         InputError: A value is missing or out of range.
@@ -49,7 +43,6 @@ def load_drive_tables(profile: AircraftProfile | None = None, *, governed_speed:
     hinge; hubs, transmission and turbines would add to it and were not found.
 
     Args:
-        profile: The aircraft; None: the XV-15.
         governed_speed: Rotor speed that the governor holds [rad/s]; 0: the XV-15's.
 
     Raises:

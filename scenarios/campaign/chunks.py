@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metric_kernels import VALUE

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.atmosphere import AirSpecification, Gust, Turbulence
-from rtsim.corridor import Corridor
+from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
+from rtsim.corridor.boundaries import Corridor
 from rtsim.errors import InputError
-from rtsim.faults import Fault
+from rtsim.faults.fault import Fault
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.loop.setup import FlightSetup
 from rtsim.lpv.files.storage import load_database
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
-from rtsim.protection import load_boundary
+from rtsim.protection.boundary import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
 from rtsim.units import deg, kt
 from scenarios.campaign.spec import CLASS_OPTIONS, CampaignFile, ClassTable, Generator, PulseDraw, draw

@@ -1,4 +1,9 @@
-"""Who does the work of a campaign: this process, processes of this machine, or a Dask cluster; always in order."""
+"""Who does the work of a campaign: this process, processes of this machine, or a Dask cluster; always in order.
+
+Legend:
+    task: The campaign.
+    chunks: The pieces.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +26,7 @@ class Executor(Protocol):
     """Flies pieces and gives them back in the order in which they were asked for."""
 
     def fly(self, task: Task, chunks: Sequence[Chunk]) -> Iterator[ChunkResult]:
-        """Fly pieces; the iterator may be closed before its end.
-
-        Args:
-            task: The campaign.
-            chunks: The pieces.
-        """
+        """Fly pieces; the iterator may be closed before its end."""
         ...
 
 
@@ -43,10 +43,6 @@ class LocalExecutor:
 
     def fly(self, task: Task, chunks: Sequence[Chunk]) -> Iterator[ChunkResult]:
         """Fly pieces in order.
-
-        Args:
-            task: The campaign.
-            chunks: The pieces.
 
         Raises:
             OutputError: A worker process died.
@@ -98,10 +94,6 @@ class DaskExecutor:
 
     def fly(self, task: Task, chunks: Sequence[Chunk]) -> Iterator[ChunkResult]:
         """Fly pieces in order.
-
-        Args:
-            task: The campaign.
-            chunks: The pieces.
 
         Raises:
             OutputError: The cluster gave up a piece.

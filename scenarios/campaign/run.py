@@ -151,7 +151,6 @@ def run_campaign(
         text: Its text, which workers read again.
         options: What is asked of it.
         executor: Who does the work; None: this process.
-        file: Where the campaign came from, for messages.
         on_progress: Told runs done and runs planned.
 
     Returns:

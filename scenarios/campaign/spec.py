@@ -5,27 +5,25 @@ Every number has its unit in its key. A number may be a constant or a distributi
 
 from __future__ import annotations
 
-import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, Field, ValidationError, create_model
 
 from rtsim.choices import CorridorName
-from rtsim.errors import InputError
+from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
-from rtsim.plugins import closest, suggestion
-from scenarios.files.problems import explain
+from rtsim.strict import Strict, explain
+from rtsim.toml_file import named_text, parse_toml, shipped_names
+from scenarios.campaign.events import EVENTS
 from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
-from scenarios.verdicts.events import EVENTS
 
 Generator = np.random.Generator
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-MAX_FILE_BYTES = 1_000_000
-"""A campaign file larger than this is refused [bytes]."""
+LIBRARY = "scenarios/campaign/library"
+"""Where the campaigns lie that come with rtsim."""
 
 
 LARGEST_SWITCH_DEG_S = 12.0
@@ -52,12 +50,6 @@ RANGES: dict[str, tuple[float, float]] = {
     "below_kt": (-200.0, 200.0),
 } | {item.key: (item.low, item.high) for item in CLASS_OPTIONS if item.low is not None and item.high is not None}
 """What numbers and the certain part of distributions must lie in, by key."""
-
-
-class Strict(BaseModel):
-    """A table of a campaign file: exact types, no unknown keys."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 class Uniform(Strict):
@@ -209,8 +201,7 @@ class CampaignFile(_FileOptions, Strict):  # type: ignore[misc]  # made from the
 
 def campaign_names() -> list[str]:
     """Names of the campaigns that come with rtsim, sorted."""
-    folder = resources.files("scenarios.campaign") / "library"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return shipped_names(LIBRARY)
 
 
 def load_campaign(name_or_path: str | Path) -> tuple[CampaignFile, str]:
@@ -225,7 +216,7 @@ def load_campaign(name_or_path: str | Path) -> tuple[CampaignFile, str]:
     Raises:
         InputError: For the first mistake found.
     """
-    text, file = _read(name_or_path)
+    text, file = named_text(name_or_path, folder=LIBRARY, noun="campaign", key="campaign")
     spec, problems = parse_campaign(text, file=file)
     if spec is None:
         raise problems[0]
@@ -237,18 +228,14 @@ def parse_campaign(text: str, *, file: str) -> tuple[CampaignFile | None, list[I
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the messages.
 
     Returns:
         The campaign and no problems, or None and at least one.
     """
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        message = str(error)
-        return None, [InputError(f"is not valid TOML: {message[:1].lower()}{message[1:]}", file=file)]
-    try:
-        spec = CampaignFile.model_validate(data)
+        spec = CampaignFile.model_validate(parse_toml(text, file=file))
+    except InputError as error:
+        return None, [error]
     except ValidationError as error:
         return None, explain(error, CampaignFile, file)
     problems = _contradictions(spec, file)
@@ -273,29 +260,6 @@ def draw(number: Number, generator: Generator) -> float:
         shares = None if weights is None else np.array(weights) / sum(weights)
         return float(generator.choice(number.choice, p=shares))
     return number
-
-
-def _read(name_or_path: str | Path) -> tuple[str, str]:
-    text = str(name_or_path)
-    if not (isinstance(name_or_path, Path) or "/" in text or text.endswith(".toml")):
-        names = campaign_names()
-        if text in names:
-            return (resources.files("scenarios.campaign") / "library" / f"{text}.toml").read_text("utf-8"), text
-        raise InputError(
-            "is not a campaign that comes with rtsim",
-            key="campaign",
-            value=text,
-            allowed=", ".join(closest(text, names)),
-            mend=f"{suggestion(text, names, otherwise='choose one')}, or give a path ending in .toml",
-        )
-    path = Path(name_or_path)
-    try:
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise InputError("is too large for a campaign", file=text, allowed=f"at most {MAX_FILE_BYTES} bytes")
-        return path.read_text(encoding="utf-8"), text
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(f"cannot be read: {why}", file=text, mend="check the path") from None
 
 
 def _contradictions(spec: CampaignFile, file: str) -> list[InputError]:

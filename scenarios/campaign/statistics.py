@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 
 CONFIDENCE = 0.95
 """Confidence of every interval that is not asked for otherwise."""

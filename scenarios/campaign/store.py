@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import zipfile
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtsim.errors import InputError, OutputError
+from rtsim.whole_file import whole_file, write_whole
 from scenarios.campaign.chunks import Chunk, ChunkResult
 
 IDENTITY_FILE = "campaign.json"
@@ -81,20 +81,13 @@ class Store:
             OutputError: It cannot be written.
         """
         path = self._chunks / _name(result.chunk)
-        temporary = path.with_suffix(".part")
-        try:
-            with temporary.open("wb") as stream:
-                np.savez(
-                    stream,
-                    metrics=result.metrics,
-                    seconds=result.seconds,
-                    problems=np.array(json.dumps(result.problems)),
-                )
-            temporary.replace(path)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-            raise OutputError(f"{path}: cannot be written: {error.strerror or error}.") from error
+        with whole_file(path) as temporary, temporary.open("wb") as stream:
+            np.savez(
+                stream,
+                metrics=result.metrics,
+                seconds=result.seconds,
+                problems=np.array(json.dumps(result.problems)),
+            )
 
     def write(self, name: str, content: bytes) -> Path:
         """Write a file of the campaign, whole or not at all.
@@ -107,9 +100,7 @@ class Store:
             Its path.
         """
         path = self._folder / name
-        temporary = path.with_name(f".{path.name}.part")
-        temporary.write_bytes(content)
-        temporary.replace(path)
+        write_whole(path, content)
         return path
 
     def _identity(self) -> Any:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import BUILT_IN_PILOT, CorridorName, PlantName
 from rtsim.errors import InputError
-from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.frame import SIGNAL_COUNT, history_sha256
 from rtsim.loop.data import SimulationTables
 from rtsim.loop.script_kernels import S_YIELDED
 from rtsim.loop.setup import FlightSetup, build_parts, start_trim
@@ -168,8 +169,6 @@ def has_trim(plant: PlantName, airspeed: float, nacelle: float, *, database: str
 
     Args:
         plant: Aircraft model.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
         database: LPV database of the aircraft, a file; empty: the shipped XV-15.
     """
     aircraft = flown_database(load_database(database or None), database or None)

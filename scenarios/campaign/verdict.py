@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.measures.metric_kernels import METRICS, VALUE
 from scenarios.campaign.chunks import LawVariant
+from scenarios.campaign.events import EVENTS
 from scenarios.campaign.spec import CampaignFile, ExpectRate
 from scenarios.campaign.statistics import Rate, bound_decided, flights_to_bound, mcnemar, quantile, rate
-from scenarios.verdicts.events import EVENTS
 
 BOOTSTRAP_SEED = 20_000
 """Added to the campaign's seed for the resampling."""

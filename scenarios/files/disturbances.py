@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from rtsim.atmosphere import SEVERITY_WIND, AirSpecification, Gust, Turbulence
+from rtsim.atmosphere.specification import SEVERITY_WIND, AirSpecification, Gust, Turbulence
 from rtsim.errors import InputError
-from rtsim.faults import Fault, FaultSwitch
+from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.units import HORSEPOWER, deg, kt, to_kt
 from scenarios.files.schema import AirGustTable, AirTable, FaultTable
 
@@ -28,7 +28,6 @@ def disturbance_problems(air: AirTable, faults: Sequence[FaultTable], file: str)
     Args:
         air: The table of the air.
         faults: The failures.
-        file: The file, for the messages.
     """
     found = []
     if air.turbulence is not None and air.wind_at_20_ft_kt is not None:

@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from rtsim.errors import InputError
+from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
-from rtsim.plugins import closest, suggestion
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
+from rtsim.strict import explain
+from rtsim.toml_file import named_text, parse_toml, shipped_names
 from rtsim.units import deg, kt
 from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
+from scenarios.files.expectation import Expectation
 from scenarios.files.nacelle_laws import automatic_problems, automatic_settings
-from scenarios.files.problems import explain
-from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Expectation, Scenario, ScenarioEvent
+from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Scenario, ScenarioEvent
 from scenarios.files.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
 from scenarios.files.trial import pulses_of, trial_of, trial_problems
 
+LIBRARY = "scenarios/library"
+"""Where the scenarios lie that come with rtsim."""
 MAX_FILE_BYTES = 4_000_000
 """A scenario file larger than this is refused before it is read [bytes]."""
 
 
 def library_names() -> list[str]:
     """Names of the scenarios that come with rtsim, sorted."""
-    folder = resources.files("scenarios") / "library"
-    return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return shipped_names(LIBRARY)
 
 
 def load_scenario(name_or_path: str | Path) -> Scenario:
@@ -67,19 +67,14 @@ def parse_scenario(text: str, *, file: str) -> tuple[Scenario | None, list[Input
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the messages.
 
     Returns:
         The scenario and no problems, or None and at least one.
     """
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        return None, [InputError(f"is not valid TOML: {_lower(str(error))}", file=file, mend="correct this line")]
-    except RecursionError:
-        return None, [InputError("is nested too deeply", file=file, mend="write flat tables")]
-    try:
-        content = ScenarioFile.model_validate(data)
+        content = ScenarioFile.model_validate(parse_toml(text, file=file))
+    except InputError as error:
+        return None, [error]
     except ValidationError as error:
         return None, explain(error, ScenarioFile, file)
     problems = _contradictions(content, file)
@@ -96,7 +91,6 @@ def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> Progra
 
     Args:
         condition: ``hover``, ``conversion`` or ``cruise``.
-        altitude: Altitude [m].
     """
     if condition not in START_CONDITIONS:
         raise InputError(
@@ -110,45 +104,9 @@ def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> Progra
     return ProgrammePoint(airspeed, nacelle_angle, altitude)
 
 
-def _lower(message: str) -> str:
-    return message[:1].lower() + message[1:]
-
-
 def _read(name_or_path: str | Path) -> tuple[str, str]:
     """The text of a scenario and how to call its file in messages."""
-    text = str(name_or_path)
-    is_path = isinstance(name_or_path, Path) or "/" in text or text.endswith(".toml")
-    if not is_path:
-        names = library_names()
-        if text in names:
-            return (resources.files("scenarios") / "library" / f"{text}.toml").read_text(encoding="utf-8"), text
-        ordered = closest(text, names)
-        raise InputError(
-            "is not a scenario of the library",
-            key="scenario",
-            value=text,
-            allowed=", ".join(ordered),
-            mend=f"{suggestion(text, names, otherwise='choose one')}, or give a path ending in .toml",
-        )
-    path = Path(name_or_path)
-    try:
-        if path.is_dir():
-            raise InputError("is a directory", file=text, mend="name a scenario file")
-        if path.stat().st_size > MAX_FILE_BYTES:
-            raise InputError("is too large for a scenario", file=text, allowed=f"at most {MAX_FILE_BYTES} bytes")
-        return path.read_text(encoding="utf-8-sig"), text  # some editors begin UTF-8 files with a mark
-    except FileNotFoundError:
-        raise InputError(
-            "does not exist", file=text, mend=f"check the path, or take one of {', '.join(library_names())}"
-        ) from None
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"is not a text file (byte {error.start} is not UTF-8)", file=text, mend="save it as UTF-8"
-        ) from None
-    except OSError as error:
-        raise InputError(
-            f"cannot be read: {_lower(error.strerror or str(error))}", file=text, mend="check its permissions"
-        ) from None
+    return named_text(name_or_path, folder=LIBRARY, noun="scenario", key="scenario", largest=MAX_FILE_BYTES)
 
 
 def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:

@@ -8,12 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from rtsim.command import Command, NacelleLaw, Sensors
 from rtsim.errors import InputError
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.programme import Programme
+from rtsim.strict import Strict
 from rtsim.units import deg, kt
 
 if TYPE_CHECKING:
@@ -32,20 +33,14 @@ Schedule = Literal["centre-line", "programme", "points"]
 NacelleLawFactory = Callable[[], NacelleLaw]
 
 
-class _Strict(BaseModel):
-    """A table of a scenario file: exact types, no unknown keys."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-class SchedulePoint(_Strict):
+class SchedulePoint(Strict):
     """One of ``automatic.points``: a corner of the schedule."""
 
     airspeed_kt: Annotated[float, Field(ge=-40.0, le=260.0, allow_inf_nan=False)]
     nacelle_deg: Annotated[float, Field(ge=0.0, le=90.0, allow_inf_nan=False)]
 
 
-class AutomaticTable(_Strict):
+class AutomaticTable(Strict):
     """``[automatic]``: settings of the automatic nacelle control."""
 
     schedule: Schedule = "centre-line"
@@ -94,7 +89,6 @@ def automatic_problems(table: AutomaticTable | None, nacelle: str, file: str) ->
     Args:
         table: The table, if there is one.
         nacelle: The key ``flight.nacelle``.
-        file: The file, for messages.
     """
     if table is None:
         return []
@@ -184,9 +178,7 @@ class NacelleLawGuard:
         """Give the command with the law's nacelle rate, and what went wrong, if anything.
 
         Args:
-            sensors: The aircraft as the law may know it.
             command: The pilot's command.
-            dt: Length of the frame [s].
         """
         if self._law is None:
             return command, ""

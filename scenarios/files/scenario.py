@@ -6,13 +6,14 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
-from rtsim.atmosphere import AirSpecification
+from rtsim.atmosphere.specification import AirSpecification
 from rtsim.choices import PilotMode
-from rtsim.faults import Fault
+from rtsim.faults.fault import Fault
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.units import deg, kt
+from scenarios.files.expectation import Expectation
 from scenarios.files.nacelle_laws import AutomaticSettings
 from scenarios.files.trial import Trial
 
@@ -34,40 +35,6 @@ class ScenarioEvent:
     """When, from the start [s]; it acts from the first frame at or after this time."""
     pilot: PilotMode
     """Who holds the sticks from then on."""
-
-
-@dataclass(frozen=True, slots=True)
-class Expectation:
-    """A metric and the range it must lie in."""
-
-    name: str
-    """What is expected, in words."""
-    metric: str
-    """Dotted name of the metric, one of ``rtsim.measures.metrics.METRIC_NAMES``; its unit is part of it."""
-    minimum: float | None
-    """Smallest value that holds."""
-    maximum: float | None
-    """Largest value that holds."""
-
-    @property
-    def limit(self) -> float | list[float]:
-        """The limit as reported: one number, or ``[minimum, maximum]``."""
-        if self.minimum is not None and self.maximum is not None:
-            return [self.minimum, self.maximum]
-        limit = self.maximum if self.minimum is None else self.minimum
-        assert limit is not None  # the loader refuses a clause without a limit
-        return limit
-
-    def holds(self, value: float | None) -> bool:
-        """Whether a measured value meets the expectation; a metric without value does not.
-
-        Args:
-            value: The metric as measured, in the unit of its name.
-        """
-        if value is None:
-            return False
-        low = self.minimum is None or value >= self.minimum
-        return low and (self.maximum is None or value <= self.maximum)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import Field, create_model
 
 from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
 from rtsim.choices import PilotMode
 from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
+from rtsim.strict import Strict
 from scenarios.files.nacelle_laws import AutomaticTable
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
@@ -29,12 +30,6 @@ DurationS = Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
 AccelerationKtS = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 NacelleRateDegS = Annotated[float, Field(ge=0.1, le=12.0, allow_inf_nan=False)]
 ClimbRateMS = Annotated[float, Field(ge=0.1, le=15.0, allow_inf_nan=False)]
-
-
-class Strict(BaseModel):
-    """A table of a scenario file: exact types, no unknown keys."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 FlightTable: Any = create_model(

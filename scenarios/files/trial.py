@@ -6,47 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from rtsim.errors import InputError
+from rtsim.errors import InputError, suggestion
 from rtsim.loop.script import Pulse
-from rtsim.plugins import suggestion
 from rtsim.units import deg
+from scenarios.files.expectation import Expectation
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
 TrialKind = Literal["nominal", "misuse", "failure", "unprotectable"]
 LARGEST_STICK, LARGEST_LEVER = 2.0, 1.0
 """Largest amounts that mean something: from stop to stop."""
-
-
-@dataclass(frozen=True, slots=True)
-class TrialClause:
-    """One expectation of a trial."""
-
-    name: str
-    """What is expected, in words."""
-    metric: str
-    """One of ``rtsim.measures.metrics.TRIAL_METRICS``."""
-    of: Literal["law", "off", "difference"]
-    """Whose value: the protected flight's, its twin's, or the first minus the second."""
-    minimum: float | None
-    """Smallest value that holds."""
-    maximum: float | None
-    """Largest value that holds."""
-
-    def holds(self, value: float) -> bool:
-        """Whether a measured value meets the expectation.
-
-        Args:
-            value: In the unit of the metric's name.
-        """
-        low = self.minimum is None or value >= self.minimum
-        return low and (self.maximum is None or value <= self.maximum)
-
-    @property
-    def limit(self) -> str:
-        """What is allowed, such as ``<= 5`` or ``1 to 2``."""
-        if self.minimum is None:
-            return f"<= {self.maximum:g}"
-        return f">= {self.minimum:g}" if self.maximum is None else f"{self.minimum:g} to {self.maximum:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +31,7 @@ class Trial:
     """How deep it must leave the corridor at least [kn]."""
     no_harm_height: float
     """Height the law may lose beyond what its twin lost [m]."""
-    clauses: tuple[TrialClause, ...]
+    clauses: tuple[Expectation, ...]
     """The scenario's own expectations."""
 
 
@@ -76,7 +44,6 @@ def trial_problems(
         pulses: The script.
         trial: The test, or None.
         has_events: Whether the scenario hands the controls over.
-        file: The file, for the messages.
     """
     found = []
     for number, pulse in enumerate(pulses):
@@ -146,7 +113,7 @@ def trial_of(table: TrialTable | None) -> Trial | None:
         off_leaves=tuple(table.off_leaves),
         off_depth_kt=table.off_depth_kt,
         no_harm_height=table.no_harm_height_m,
-        clauses=tuple(TrialClause(item.name, item.metric, item.of, item.min, item.max) for item in table.expect),
+        clauses=tuple(Expectation(item.name, item.metric, item.min, item.max, item.of) for item in table.expect),
     )
 
 

@@ -14,28 +14,20 @@ import rtsim
 from rtsim.loop.simulation import FlightSetup
 from rtsim.lpv.files.storage import load_database
 from rtsim.programme import Programme
-from rtsim.protection import load_boundary
+from rtsim.protection.boundary import load_boundary
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import automatic_nacelle
 from scenarios.files.scenario import Scenario
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 
 
 def flight_frames(scenario: Scenario) -> int:
-    """Frames of a flight: the last one starts before its end.
-
-    Args:
-        scenario: What is flown.
-    """
+    """Frames of a flight: the last one starts before its end."""
     return max(1, math.ceil(scenario.duration * scenario.options.rate_hz - 1e-6))
 
 
 def flight_setup(scenario: Scenario) -> FlightSetup:
-    """What the simulation needs to know of a scenario.
-
-    Args:
-        scenario: What is flown.
-    """
+    """What the simulation needs to know of a scenario."""
     return FlightSetup(
         programme=scenario.programme,
         options=scenario.options,
@@ -66,11 +58,7 @@ def corridor_outline(name: str, database: str = "") -> CorridorOutline:
 
 
 def replay_setup(scenario: Scenario) -> dict[str, Any]:
-    """Everything a replay must know besides commands and events, as JSON values that read back exactly.
-
-    Args:
-        scenario: What is flown.
-    """
+    """Everything a replay must know besides commands and events, as JSON values that read back exactly."""
     return {"flight": setup_to_json(flight_setup(scenario))}
 
 

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol, get_args
 
-from rtsim.aids import SWITCHES
 from rtsim.aids.aids_kernels import MAP_STICK, scheduled
+from rtsim.aids.design import SWITCHES
+from rtsim.arrays import FloatArray
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN
 from rtsim.loop.simulation import Simulation
-from rtsim.protection import load_boundary
-from rtsim.realtime import FlightControl, SwitchedFlight
-from rtsim.sticks import INPUT_LIVE, INPUT_NONE, StickHandler, StickSettings, StickSituation, transition_schedule
+from rtsim.protection.boundary import load_boundary
+from rtsim.realtime.control import FlightControl
+from rtsim.realtime.source import SwitchedFlight
+from rtsim.sticks.handler import INPUT_LIVE, INPUT_NONE, StickHandler, StickSituation
+from rtsim.sticks.settings import StickSettings
+from rtsim.sticks.transition import transition_schedule
 from rtsim.units import KNOT, deg
-from telemetry.mavlink import Feedback, MavlinkLink, Request
+from telemetry.mavlink.exchange import Feedback, Request
+from telemetry.mavlink.link import MavlinkLink
 
 _WATCH_FRAMES = 64
 
@@ -113,12 +118,7 @@ class Hands:
         return command
 
     def after(self, row: FloatArray, dt: float) -> None:
-        """Look at the frame that was flown.
-
-        Args:
-            row: Its row.
-            dt: Length of a frame [s].
-        """
+        """Look at the frame that was flown."""
         # The command angle of the actuator at the start of the coming frame.
         self._angle = deg(row[COLUMN.nacelle_reference_deg] + row[COLUMN.nacelle_command_rate_deg_s] * dt)
         self._airspeed = row[COLUMN.airspeed_kt] * KNOT

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.corridor import LEVEL_NAMES
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import LEVEL_NAMES
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
@@ -44,7 +45,6 @@ class LimitWatch:
         Args:
             corridor_name: Corridor that is watched.
             tell: Told every event.
-            dt: Length of a frame [s].
             database: LPV database of the aircraft, a file; empty: the shipped XV-15.
         """
         aircraft = load_database(database or None)
@@ -81,11 +81,7 @@ class LimitWatch:
             self.rows(rows)
 
     def rows(self, rows: FloatArray) -> None:
-        """Look at consecutive rows.
-
-        Args:
-            rows: The frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Look at consecutive rows."""
         if not len(rows):
             return
         if rows[0, COLUMN.frame] <= self._frame:

@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import rtsim
-from rtsim.aids import SWITCHES
+from rtsim.aids.design import SWITCHES
 from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.limits import load_limits
-from rtsim.sticks import StickSettings
+from rtsim.sticks.settings import StickSettings
 from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
-from telemetry.mavlink import HomePosition, MavlinkConfig
-from telemetry.mavlink.config import Ratings, endpoints
+from telemetry.mavlink.config import HomePosition, MavlinkConfig, Ratings, endpoints
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
@@ -58,7 +57,6 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
 
     Args:
         options: What the user wants.
-        scenario: What is flown.
 
     Returns:
         The settings, and a warning to print or None.
@@ -135,7 +133,6 @@ def refuse_unpaced(scenario: Scenario, *, paced: bool) -> None:
     """Refuse MAVLink in a flight that is flown as fast as it goes: nobody could follow it.
 
     Args:
-        scenario: What is flown.
         paced: Whether the flight is paced.
 
     Raises:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import tomllib
-
 from rtsim.choices import BUILT_IN_PILOT
 from rtsim.errors import InputError, RtsimError
+from rtsim.toml_file import parse_toml
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import load_nacelle_law
 from scenarios.files.scenario import START_CONDITIONS, Scenario
@@ -46,11 +45,7 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
 
 
 def start_problems(scenario: Scenario) -> list[InputError]:
-    """Whether the aircraft can be trimmed where a scenario starts; an empty list where it can.
-
-    Args:
-        scenario: What is to be flown.
-    """
+    """Whether the aircraft can be trimmed where a scenario starts; an empty list where it can."""
     start = scenario.start
     if (start.airspeed, start.nacelle_angle) in START_CONDITIONS.values():
         return []
@@ -79,7 +74,7 @@ def start_problems(scenario: Scenario) -> list[InputError]:
 
 def _placed(error: InputError, scenario: Scenario, key: str) -> InputError:
     """The error where its value stands: in the scenario's file, or else on the command line."""
-    table = tomllib.loads(scenario.source).get("flight", {}) if scenario.source else {}
+    table = parse_toml(scenario.source, file=scenario.file).get("flight", {}) if scenario.source else {}
     if table.get(key) != getattr(scenario.options, key):
         return error
     return InputError(

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import switch_of
+from rtsim.aids.design import switch_of
+from rtsim.arrays import FloatArray
 from rtsim.command import Command
 from rtsim.errors import InputError
-from rtsim.frame import COLUMN, SIGNAL_NAMES, FloatArray, history_sha256
+from rtsim.frame import COLUMN, SIGNAL_NAMES, history_sha256
 from rtsim.loop.simulation import MODES, Simulation
 from scenarios.files.disturbances import DISTURBANCE_KINDS, disturbance_from_event
 from scenarios.flight.flight_setup import setup_from_json, versions

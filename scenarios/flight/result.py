@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rtsim.errors import OutputError
-from rtsim.frame import SIGNAL_NAMES, SIGNALS, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.errors import OutputError, closest
+from rtsim.frame import SIGNAL_NAMES, SIGNALS
 from rtsim.measures.metrics import FlightMetrics
-from rtsim.plugins import closest
 from rtsim.realtime.report import Spread, TimingReport
 from scenarios.files.scenario import Scenario
 from telemetry.log.format import LogEvent
@@ -141,7 +141,6 @@ def judge(
     """Judge a flight by its scenario's expectations; being completed is the first of them.
 
     Args:
-        scenario: What was flown.
         metrics: What was measured.
         completed: Whether it was flown to its end.
         end_reason: Why it ended.

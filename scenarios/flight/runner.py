@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from rtsim.frame import FloatArray, history_sha256
+from rtsim.frame import history_sha256
 from rtsim.loop import beside
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.metrics import flight_metrics
-from rtsim.realtime import Executive, FlightControl, OverrunPolicy
-from rtsim.realtime.control import checked_speed
+from rtsim.realtime.control import FlightControl, checked_speed
+from rtsim.realtime.executive import Executive
+from rtsim.realtime.policy import OverrunPolicy
 from rtsim.realtime.report import TimingReport
 from scenarios.files.loader import load_scenario
 from scenarios.files.nacelle_laws import load_nacelle_law
@@ -36,7 +38,7 @@ from telemetry.log.format import FlightMetadata, LogEvent
 
 if TYPE_CHECKING:
     from telemetry.log.recorder import Recorder
-    from telemetry.mavlink import MavlinkLink
+    from telemetry.mavlink.link import MavlinkLink
     from telemetry.view.options import ViewOptions
     from telemetry.view.view import RerunView
 
@@ -182,7 +184,7 @@ def _start_mavlink(scenario: Scenario, outputs: FlightOutputs, *, live: bool) ->
     if outputs.mavlink is None and not flown_by_hand(scenario.options.pilot):
         return None
     refuse_unpaced(scenario, paced=live)
-    from telemetry.mavlink import MavlinkLink
+    from telemetry.mavlink.link import MavlinkLink
 
     config, warning = mavlink_config(outputs.mavlink or MavlinkOptions(), scenario)
     if warning is not None and outputs.on_message is not None:

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids import switch_of
+from rtsim.aids.design import switch_of
+from rtsim.arrays import FloatArray
 from rtsim.choices import PilotMode
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
-from rtsim.faults import fault_events
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.faults.fault import fault_events
+from rtsim.frame import SIGNAL_COUNT
 from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.protection.chain import LawEvent
@@ -38,7 +39,7 @@ GENTLE_END = END_REASONS[END.gentle_landing].split(",", maxsplit=1)[0]
 
 
 class FlightSession:
-    """Flies a simulation for a number of frames; implements ``rtsim.realtime.FrameSource``.
+    """Flies a simulation for a number of frames; implements ``rtsim.realtime.source.FrameSource``.
 
     Everything that changes the flight from outside (a scenario's event, a key, a reset, a pilot that fails) becomes
     an event with the number of the row before which it acts, which is all a replay needs.
@@ -222,7 +223,7 @@ class FlightSession:
         """Switch a pilot aid from the coming frame on; one that cannot be switched is told and changes nothing.
 
         Args:
-            name: One of ``rtsim.aids.SWITCHES``.
+            name: One of ``rtsim.aids.design.SWITCHES``.
             on: On or off; None switches it over.
         """
         on = name not in self.simulation.aids if on is None else on

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from rtsim.corridor import LEVEL_NAMES
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.errors import OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS
 from telemetry.log.format import LogEvent
 
 if TYPE_CHECKING:
@@ -31,20 +32,11 @@ class RowLog(Protocol):
         ...
 
     def push(self, row: FloatArray, timing: FloatArray | None = None) -> None:
-        """Keep one row.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Its timing columns; None where the flight is not paced.
-        """
+        """Keep one row."""
         ...
 
     def push_block(self, rows: FloatArray) -> None:
-        """Keep many rows.
-
-        Args:
-            rows: The frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Keep many rows."""
         ...
 
     def event(self, event: LogEvent) -> None:
@@ -65,12 +57,7 @@ class RowView(Protocol):
         ...
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show one row.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Timing columns of the frame before.
-        """
+        """Show one row."""
         ...
 
     @property
@@ -101,12 +88,7 @@ class RowMirror(Protocol):
     """Whatever else is shown every row of a paced flight; nothing of it may wait."""
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show one row.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Timing columns of the frame before.
-        """
+        """Show one row."""
         ...
 
 
@@ -152,7 +134,7 @@ class History:
 
 
 class FlightSinks:
-    """Hands rows on; implements ``rtsim.realtime.FrameSink``."""
+    """Hands rows on; implements ``rtsim.realtime.executive.FrameSink``."""
 
     def __init__(
         self,
@@ -186,12 +168,7 @@ class FlightSinks:
         self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
 
     def view(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show a row.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Timing columns of the frame before.
-        """
+        """Show a row."""
         if self._view is not None:
             timing[_DROPPED] = self._view.dropped
             self._view.push(row, timing)
@@ -199,12 +176,7 @@ class FlightSinks:
             self._mirror.push(row, timing)
 
     def record(self, row: FloatArray, timing: FloatArray) -> None:
-        """Keep a row.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Its timing columns.
-        """
+        """Keep a row."""
         self.history.append(row)
         if self._log is not None:
             self._log.push(row, timing)
@@ -218,11 +190,7 @@ class FlightSinks:
             self._on_rows(row)
 
     def block(self, rows: FloatArray) -> None:
-        """Show and keep many rows.
-
-        Args:
-            rows: The frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Show and keep many rows."""
         if not len(rows):
             return
         self.history.extend(rows)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
+from rtsim.toml_file import shipped_toml
 from scenarios.reproduction.evidence import Evidence, Number
 from scenarios.reproduction.flights import Variant
 from scenarios.reproduction.judges import JUDGES
@@ -104,8 +103,7 @@ def _listed(words: Sequence[str]) -> str:
 
 def claim_texts() -> tuple[ClaimText, ...]:
     """All claims, in the order of the paper."""
-    text = (resources.files("scenarios.reproduction") / "data" / "claims.toml").read_text(encoding="utf-8")
-    return tuple(ClaimText(**entry) for entry in tomllib.loads(text)["claim"])
+    return tuple(ClaimText(**entry) for entry in shipped_toml("scenarios/reproduction/data", "claims.toml")["claim"])
 
 
 def judge_claims(baseline: Evidence, others: Mapping[Variant, Evidence]) -> tuple[Claim, ...]:

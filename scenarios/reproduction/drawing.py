@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rtsim.corridor import load_corridor
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.optimization.path import ConversionPath
 from rtsim.units import deg, to_kt
+from rtsim.whole_file import whole_file
 from scenarios.reproduction.study import Study
 
 if TYPE_CHECKING:
@@ -188,8 +189,6 @@ def save_figures(
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    from telemetry.log.export import write_and_rename
-
     files: dict[int, list[Path]] = {}
     with mpl.rc_context(STYLE):
         for plan in plans:
@@ -199,12 +198,9 @@ def save_figures(
             files[plan.number] = []
             for suffix in FORMATS:
                 path = directory / f"{plan.stem}.{suffix}"
-
-                def write(temporary: Path, *, kind: str = suffix, picture: Figure = figure) -> None:
-                    metadata = {"Date": None} if kind == "svg" else {"Software": None}
-                    picture.savefig(temporary, dpi=150, format=kind, metadata=metadata)
-
-                write_and_rename(path, write)
+                metadata = {"Date": None} if suffix == "svg" else {"Software": None}
+                with whole_file(path) as temporary:
+                    figure.savefig(temporary, dpi=150, format=suffix, metadata=metadata)
                 files[plan.number].append(path)
             drawn(1.0)
     return files

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.corridor import load_corridor
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import AccelerationCaps, path_through
 from rtsim.optimization.paths import centre_line_corners, trim_flapping_map
@@ -187,7 +187,7 @@ def twelve_seconds(database: str = "") -> dict[str, Number]:
     Args:
         database: LPV database that the pilot knows, a file; empty: the shipped XV-15.
     """
-    from rtsim.nacelle import NacelleActuator
+    from rtsim.nacelle.switch import NacelleActuator
 
     actuator, dt, time = NacelleActuator(deg(90.0)), 0.004, 0.0
     while actuator.angle > deg(0.5) and time < 60.0:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.paths import trim_flapping_map
 from rtsim.units import to_deg, to_kt

@@ -7,9 +7,10 @@ import math
 from dataclasses import dataclass
 
 from rtsim.aircraft.profile import xv15_profile
-from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.arrays import FloatArray
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.choices import OuterLoop, PlantName
-from rtsim.frame import SIGNAL_NAMES, FloatArray
+from rtsim.frame import SIGNAL_NAMES
 from rtsim.loop.setup import FlightSetup, build_parts
 from rtsim.loop.simulation import Simulation
 from rtsim.lpv.files.storage import load_database

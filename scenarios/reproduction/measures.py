@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.corridor import load_corridor
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.measures.metrics import FlightMetrics, flight_metrics
 from rtsim.optimization.paths import TABLE_1
 from rtsim.units import STICK_HALF_TRAVEL_IN, deg, kt, to_kt
@@ -149,7 +149,6 @@ def flown_trim(flight: Flight, *, level: bool = False) -> FloatArray:
     """Trimmed flapping along a flight at the acceleration of its reference [deg], shape (frames,).
 
     Args:
-        flight: The flight.
         level: Leave the acceleration out, as the paper's map does.
     """
     acceleration = 0.0 if level else np.gradient(flight["airspeed_reference_kt"], flight.time)

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import rtsim
 from rtsim.errors import InputError, OutputError
+from rtsim.whole_file import write_whole
 from scenarios.reproduction.claims import Claim
 from scenarios.reproduction.drawing import save_figures
 from scenarios.reproduction.figures import FIGURES
 from scenarios.reproduction.report import report_html
 from scenarios.reproduction.study import run_study, work_amount
-from telemetry.log.export import write_and_rename
 
 REPORT_NAME, CLAIMS_NAME = "report.html", "claims.json"
 
@@ -59,17 +59,13 @@ def reproduce(
     study = run_study(jobs=jobs, progress=advance, database=database)
     files = save_figures(study, FIGURES, out / "figures", drawn=advance)
     text = report_html(study, FIGURES, files, version=rtsim.__version__)
-    write_and_rename(out / REPORT_NAME, lambda path: _write(path, text))
+    write_whole(out / REPORT_NAME, text)
     entries = {"claims": [claim.to_json() for claim in study.claims], "database_sha256": study.database_hash}
     content = json.dumps(entries, indent=1, ensure_ascii=False) + "\n"
-    write_and_rename(out / CLAIMS_NAME, lambda path: _write(path, content))
+    write_whole(out / CLAIMS_NAME, content)
     return Reproduction(study.claims, out / REPORT_NAME, tuple(path for pair in files.values() for path in pair))
 
 
 def total_work() -> int:
     """Amount of work, in the unit of the progress."""
     return work_amount() + len(FIGURES)
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")

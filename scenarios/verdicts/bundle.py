@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rtsim.errors import OutputError
-from rtsim.protection import LAW_NAMES
+from rtsim.protection.tables import LAW_NAMES
 from scenarios.flight.flight_setup import versions
 from scenarios.flight.runner import FlightOutputs, fly
 from scenarios.verdicts.tester import Case

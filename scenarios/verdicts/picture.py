@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection import load_boundary
+from rtsim.protection.boundary import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import LIMIT_KINDS, load_limits
 from rtsim.protection.monitor_kernels import LIMIT_WORDS
@@ -46,9 +47,6 @@ def reason_name(reason: float) -> str:
 
 def interventions(rows: FloatArray) -> list[dict[str, Any]]:
     """When a law acted, on which channel and why; pauses shorter than 0.5 s do not part what belongs together.
-
-    Args:
-        rows: Frame rows.
 
     Returns:
         By channel and reason: ``channel, limit, from_s, to_s``.

@@ -9,17 +9,18 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.choices import HAND_PILOT
-from rtsim.frame import SIGNAL_COUNT, FloatArray, history_sha256
+from rtsim.frame import SIGNAL_COUNT, history_sha256
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import FlightMetrics, TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
+from scenarios.campaign.events import new_violations
 from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
-from scenarios.files.scenario import Expectation, Scenario
+from scenarios.files.scenario import Scenario
 from scenarios.files.trial import Trial
 from scenarios.flight.flight_setup import flight_setup
-from scenarios.verdicts.events import new_violations
 
 LAW_CLAUSE = "law"
 """Metric of the clause that the law runs without failing."""
@@ -214,7 +215,7 @@ class Tester:
         for item in record.verdicts:
             clause = asked.get(item.name)
             metric = "completed" if clause is None else clause.metric
-            words = _words(item.limit) if clause is None else _limit_words(clause)
+            words = str(item.limit) if clause is None else clause.words
             value = None if item.value is None else float(item.value)
             findings.append(Finding(item.name, metric, item.held, value, words))
         return Case(
@@ -231,11 +232,7 @@ class Tester:
 
 
 def plan_of(scenario: Scenario) -> FlightPlan:
-    """The flight of a scenario, without a law.
-
-    Args:
-        scenario: The scenario.
-    """
+    """The flight of a scenario, without a law."""
     return FlightPlan(flight_setup(scenario), scenario.duration)
 
 
@@ -245,11 +242,7 @@ def _judged(scenario: Scenario) -> Scenario:
 
 
 def is_test(scenario: Scenario) -> bool:
-    """Whether a scenario can be flown and judged without a person.
-
-    Args:
-        scenario: The scenario.
-    """
+    """Whether a scenario can be flown and judged without a person."""
     judged = scenario.trial is not None or bool(scenario.expectations)
     return judged and scenario.options.pilot != HAND_PILOT
 
@@ -258,7 +251,6 @@ def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
     """A scenario that could not be flown.
 
     Args:
-        scenario: The scenario.
         law: Law that was asked for; None: the scenario's own.
         problem: What kept it from being flown.
     """
@@ -329,7 +321,7 @@ def _clause_findings(trial: Trial, law: TrialMetrics, off: TrialMetrics) -> list
             else (law[clause.metric] - off[clause.metric])
         )
         metric = clause.metric if clause.of == "law" else f"{clause.of}.{clause.metric}"
-        found.append(Finding(clause.name, metric, clause.holds(value), value, clause.limit))
+        found.append(Finding(clause.name, metric, clause.holds(value), value, clause.words))
     return found
 
 
@@ -338,19 +330,5 @@ def _flight_findings(scenario: Scenario, metrics: FlightMetrics) -> list[Finding
     found = []
     for clause in scenario.expectations:
         value = metrics.value(clause.metric)
-        found.append(Finding(clause.name, clause.metric, clause.holds(value), value, _limit_words(clause)))
+        found.append(Finding(clause.name, clause.metric, clause.holds(value), value, clause.words))
     return found
-
-
-def _limit_words(clause: Expectation) -> str:
-    """What a clause of ``[[expect]]`` allows, such as ``<= 1``."""
-    words = _words(clause.limit)
-    if clause.minimum is None:
-        return f"<= {words}"
-    return f">= {words}" if clause.maximum is None else words
-
-
-def _words(limit: float | bool | list[float]) -> str:
-    if isinstance(limit, list):
-        return " to ".join(f"{item:g}" for item in limit)
-    return str(limit) if isinstance(limit, bool) else f"{limit:g}"

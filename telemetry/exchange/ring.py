@@ -16,8 +16,9 @@ from multiprocessing.shared_memory import SharedMemory
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
+from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS
 
 TIMING_COUNT = len(TIMING_SIGNALS)
 """Number of wall-clock columns that follow the signals in a full row."""
@@ -94,12 +95,7 @@ class Ring:
         return int(self._header[_HEARTBEAT]) if self._open else 0
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Publish one row; costs about a microsecond and never waits.
-
-        Args:
-            row: The frame's signals, shape (SIGNAL_COUNT,).
-            timing: The frame's wall-clock columns, shape (TIMING_COUNT,).
-        """
+        """Publish one row; costs about a microsecond and never waits."""
         written = self._written
         slot = written & self._mask
         self._history[slot][:] = row

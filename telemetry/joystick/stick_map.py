@@ -7,18 +7,16 @@ There are two kinds. A *vehicle* map says which axes of MANUAL_CONTROL move the 
 
 from __future__ import annotations
 
-import difflib
-import tomllib
-from collections.abc import Iterator
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 from rtsim.errors import InputError
+from rtsim.strict import Strict, checked
+from rtsim.toml_file import named_text, parse_toml, shipped_names
 
-_MOST_BYTES = 200_000
+_LIBRARY = "telemetry/joystick/maps"
 _Part = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 _DeadBand = Annotated[float, Field(ge=0.0, le=0.3, allow_inf_nan=False)]
 _ManualAxis = Annotated[str, Field(pattern=r"^(-?(x|y|z|r|s|t|aux[1-6]))?$")]
@@ -43,11 +41,7 @@ DeviceFunction = Literal[Function, "arm", "reset", "lever_up", "lever_down"]
 """What a button of a gamepad can do."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
-
-class Shape(_Strict):
+class Shape(Strict):
     """``[shape]`` of a vehicle map: the longitudinal stick."""
 
     dead_band: _DeadBand = 0.0
@@ -58,7 +52,7 @@ class Shape(_Strict):
     """Stick at full deflection, part of half travel."""
 
 
-class NacelleSwitchTable(_Strict):
+class NacelleSwitchTable(Strict):
     """``[nacelle]`` of a vehicle map."""
 
     detents: bool = False
@@ -67,7 +61,7 @@ class NacelleSwitchTable(_Strict):
     """Rate of switch and commands [deg/s]."""
 
 
-class VehicleMap(_Strict):
+class VehicleMap(Strict):
     """A vehicle map."""
 
     format: Literal[1] = 1
@@ -84,7 +78,7 @@ class VehicleMap(_Strict):
     """Bit of MANUAL_CONTROL behind each function."""
 
 
-class DeviceAxis(_Strict):
+class DeviceAxis(Strict):
     """One axis of a gamepad."""
 
     index: Annotated[int, Field(ge=0, le=63)]
@@ -106,7 +100,7 @@ class LeverAxis(DeviceAxis):
     """Lever travel per second at full deflection, mode ``rate``."""
 
 
-class DeviceAxes(_Strict):
+class DeviceAxes(Strict):
     """``[axes]`` of a gamepad map."""
 
     stick: DeviceAxis
@@ -119,7 +113,7 @@ class DeviceAxes(_Strict):
     """Power lever, up positive."""
 
 
-class GamepadMap(_Strict):
+class GamepadMap(Strict):
     """A gamepad map."""
 
     format: Literal[1] = 1
@@ -144,7 +138,7 @@ StickMap = VehicleMap | GamepadMap
 
 def map_names() -> list[str]:
     """Names of the maps that come with rtsim, sorted."""
-    return sorted(entry.name.removesuffix(".toml") for entry in _library() if entry.name.endswith(".toml"))
+    return shipped_names(_LIBRARY)
 
 
 def load_stick_map(name_or_path: str | Path) -> StickMap:
@@ -156,11 +150,8 @@ def load_stick_map(name_or_path: str | Path) -> StickMap:
     Raises:
         InputError: It does not exist or is wrong; the first mistake is told.
     """
-    text, file = _read(name_or_path)
-    found = parse_stick_map(text, file=file)
-    if isinstance(found, InputError):
-        raise found
-    return found
+    text, file = named_text(name_or_path, folder=_LIBRARY, noun="stick map", key="--map")
+    return parse_stick_map(text, file=file)
 
 
 def load_vehicle_map(name_or_path: str | Path | None) -> VehicleMap:
@@ -216,35 +207,29 @@ def _matches(part: str, device: str) -> bool:
     return part[1:] == device if part.startswith("=") else part in device
 
 
-def parse_stick_map(text: str, *, file: str) -> StickMap | InputError:
+def parse_stick_map(text: str, *, file: str) -> StickMap:
     """Check the text of a map.
 
     Args:
         text: The TOML text.
-        file: Where it came from, for the message.
 
-    Returns:
-        The map, or its first mistake.
+    Raises:
+        InputError: For the first mistake found.
     """
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        return InputError(f"is not valid TOML: {error}", file=file, mend="correct this line")
+    data = parse_toml(text, file=file)
     kind = data.get("kind")
     models: dict[Any, type[StickMap]] = {"vehicle": VehicleMap, "gamepad": GamepadMap}
     if not isinstance(kind, str) or kind not in models:
-        return InputError(
+        raise InputError(
             "is no kind of stick map", file=file, key="kind", value=kind, allowed="vehicle, gamepad", mend="choose one"
         )
-    try:
-        found = models[kind].model_validate(data)
-    except ValidationError as error:
-        return _explain(error, models[kind], file)
-    return _shared(found, file) or found
+    found = checked(models[kind], data, file=file)
+    _refuse_shared(found, file)
+    return found
 
 
-def _shared(found: StickMap, file: str) -> InputError | None:
-    """The first axis or button that has two things to do: neither would work."""
+def _refuse_shared(found: StickMap, file: str) -> None:
+    """Refuse an axis or a button that has two things to do: neither would work."""
     if isinstance(found, VehicleMap):
         from telemetry.mavlink.pilot_input import STANDARD_AXES, STANDARD_BUTTONS
 
@@ -260,77 +245,12 @@ def _shared(found: StickMap, file: str) -> InputError | None:
             other = first.setdefault(place, key)
             if other != key:
                 mend = f"move {table}.{other} or {table}.{key}"
-                return InputError(
+                raise InputError(
                     f"is used by {table}.{other} too", file=file, key=f"{table}.{key}", value=place, mend=mend
                 )
-    return None
-
-
-def _explain(error: ValidationError, model: type[BaseModel], file: str) -> InputError:
-    """The first finding as a sentence."""
-    item = error.errors()[0]
-    place = [part for part in item["loc"] if part != "[key]"]
-    key = ".".join(str(part) for part in place)
-    kind = item["type"]
-    if kind == "missing":
-        return InputError("is missing", file=file, key=key, mend="add it")
-    if kind == "extra_forbidden":
-        known = list(_known_keys(model, place[:-1]))
-        similar = difflib.get_close_matches(str(place[-1]), known, n=1)
-        mend = f"perhaps '{similar[0]}' is meant" if similar else "delete it"
-        return InputError("is not a known key", file=file, key=key, allowed=", ".join(known), mend=mend)
-    context = item.get("ctx", {})
-    allowed = context.get("expected")
-    if "ge" in context:
-        allowed = f"at least {context['ge']:g}"
-    elif "le" in context:
-        allowed = f"at most {context['le']:g}"
-    message = item["msg"][:1].lower() + item["msg"][1:].rstrip(".")
-    return InputError(message, file=file, key=key, value=item.get("input"), allowed=allowed, mend="correct the value")
-
-
-def _known_keys(model: type[BaseModel], place: list[Any]) -> Iterator[str]:
-    """Keys of the table a place leads to."""
-    here: Any = model
-    for part in place:
-        field = here.model_fields.get(part) if isinstance(here, type) and issubclass(here, BaseModel) else None
-        if field is None:
-            return
-        candidates = [field.annotation, *getattr(field.annotation, "__args__", ())]
-        here = next((each for each in candidates if isinstance(each, type) and issubclass(each, BaseModel)), None)
-    if isinstance(here, type) and issubclass(here, BaseModel):
-        yield from sorted(here.model_fields)
 
 
 def _wrong_kind(name: object, wanted: str, command: str) -> InputError:
     return InputError(
         f"is not a {wanted} map", key="kind", file=str(name), allowed=wanted, mend=f"it is meant for {command}"
     )
-
-
-def _library() -> Any:
-    return (resources.files("telemetry.joystick") / "maps").iterdir()
-
-
-def _read(name_or_path: str | Path) -> tuple[str, str]:
-    """The text of a map, and how to call its file."""
-    text = str(name_or_path)
-    names = map_names()
-    if isinstance(name_or_path, str) and "/" not in text and not text.endswith(".toml"):
-        if text not in names:
-            raise InputError(
-                "is not a stick map of the library",
-                key="--map",
-                value=text,
-                allowed=", ".join(names),
-                mend="choose one, or give a path ending in .toml",
-            )
-        return (resources.files("telemetry.joystick") / "maps" / f"{text}.toml").read_text(encoding="utf-8"), text
-    try:
-        path = Path(name_or_path)
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError("is too large for a stick map", file=text)
-        return path.read_text(encoding="utf-8"), text
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text file"
-        raise InputError(f"cannot be read: {reason}", file=text, mend="check the path") from None

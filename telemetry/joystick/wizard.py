@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from pathlib import Path
 
-from rtsim.errors import OutputError
+from rtsim.whole_file import write_whole
 from telemetry.joystick.mapping import DeviceState
 from telemetry.joystick.stick_map import DeviceAxes, DeviceAxis, DeviceFunction, GamepadMap, LeverAxis
 
@@ -150,13 +149,7 @@ def write_map(stick_map: GamepadMap, path: str | os.PathLike[str]) -> None:
     Raises:
         OutputError: It cannot be written.
     """
-    file = Path(path)
-    temporary = file.with_name(f".{file.name}.part")
-    try:
-        temporary.write_text(map_text(stick_map), encoding="utf-8")
-        temporary.replace(file)
-    except OSError as failure:
-        raise OutputError(f"{file}: cannot be written: {failure.strerror}.") from failure
+    write_whole(path, map_text(stick_map))
 
 
 def _quoted(text: str) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import json
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from rtsim.errors import InputError, OutputError
+from rtsim.errors import InputError
+from rtsim.whole_file import whole_file
 from telemetry.log.reader import FlightLog
 
 EXPORT_FORMATS = (".csv", ".mat")
@@ -38,40 +38,8 @@ def export_log(log: FlightLog, target: str | os.PathLike[str]) -> None:
             file=str(path),
             allowed=" or ".join(f"*{end}" for end in EXPORT_FORMATS),
         )
-    write_and_rename(path, lambda temporary: writers[path.suffix](log, temporary))
-
-
-def write_and_rename(path: Path, write: Callable[[Path], None]) -> None:
-    """Let ``write`` fill a temporary file beside the target, then rename it: the target is whole or absent.
-
-    Args:
-        path: The file to appear.
-        write: Writes the content to the path it is given, which has the target's ending.
-
-    Raises:
-        OutputError: The file cannot be written.
-    """
-    temporary: Path | None = None
-    try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-        temporary = Path(name)
-        write(temporary)
-        temporary.chmod(0o666 & ~_umask())
-        temporary.replace(path)
-    except OSError as failure:
-        reason = failure.strerror or failure
-        raise OutputError(f"{path}: cannot be written ({reason}); choose another path.") from failure
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    """The process's file mode mask, which can only be read by setting it."""
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask
+    with whole_file(path) as temporary:
+        writers[path.suffix](log, temporary)
 
 
 def _write_csv(log: FlightLog, path: Path) -> None:

@@ -5,23 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import FloatArray
-from telemetry.log.export import write_and_rename
+from rtsim.whole_file import whole_file
 from telemetry.log.reader import FlightLog
-from telemetry.view.signal_groups import label, plot_groups
+from telemetry.log.signal_groups import label, plot_groups
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from telemetry.view.corridor_outline import CorridorOutline
+    from telemetry.log.corridor_outline import CorridorOutline
 
 _Picture = tuple[str, "Callable[[FlightLog, Figure], None]", tuple[float, float]]
 
@@ -133,7 +132,8 @@ def _write(
             path = target.with_suffix(f".{ending}")
             # Without its date the same flight gives the same file.
             options: dict[str, Any] = {"metadata": {"Date": None}} if ending == "svg" else {"dpi": 130}
-            write_and_rename(path, partial(figure.savefig, **options))
+            with whole_file(path) as temporary:
+                figure.savefig(temporary, **options)
             yield path
 
 

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rtsim.frame import SIGNALS, TIMING_SIGNALS
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 
 if TYPE_CHECKING:
     import pyarrow as pa

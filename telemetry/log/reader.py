@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import SIGNAL_NAMES, FloatArray, history_sha256
+from rtsim.frame import SIGNAL_NAMES, history_sha256
 from telemetry.log.format import (
     EVENTS_FILE,
     HEADER_PART,

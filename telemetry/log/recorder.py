@@ -23,8 +23,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import SIGNAL_COUNT, FloatArray
+from rtsim.frame import SIGNAL_COUNT
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.log.format import EVENTS_FILE, FlightMetadata, LogEvent
@@ -88,12 +89,7 @@ class Recorder:
         return sum(len(chunk) for chunk in self._backlog)
 
     def push(self, row: FloatArray, timing: FloatArray | None = None) -> None:
-        """Take one row.
-
-        Args:
-            row: The frame's signals, shape (SIGNAL_COUNT,).
-            timing: Its wall-clock columns, shape (TIMING_COUNT,); None where the flight is not paced.
-        """
+        """Take one row."""
         fill = self._fill
         self._history[fill][:] = row
         self._timing[fill][:] = np.nan if timing is None else timing
@@ -102,11 +98,7 @@ class Recorder:
             self.flush()
 
     def push_block(self, rows: FloatArray) -> None:
-        """Take many rows at once, without timing.
-
-        Args:
-            rows: Signals of consecutive frames, shape (frames, SIGNAL_COUNT).
-        """
+        """Take many rows at once, without timing."""
         self._gather()
         for start in range(0, len(rows), 256):
             piece = rows[start : start + 256]

@@ -19,7 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from telemetry.exchange.child_process import lower_priority
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.log.format import EVENTS_FILE, HEADER_PART, log_schema, part_name

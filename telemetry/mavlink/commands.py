@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import all as dialect
 
-from rtsim.errors import InputError
+from rtsim.errors import InputError, OutputError
 from rtsim.units import deg
 from telemetry.mavlink import messages as ids
 from telemetry.mavlink.exchange import Request
 from telemetry.mavlink.modes import requests_for
 from telemetry.mavlink.notices import INFO, NOTICE, WARNING
+from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import ARM_NEUTRAL, LOSS_TIME
+from telemetry.mavlink.peers import Peer
+from telemetry.mavlink.services import Services
 from telemetry.mavlink.streams import DEFAULT_RATES_HZ
-
-if TYPE_CHECKING:
-    from telemetry.mavlink.peers import Peer
-    from telemetry.mavlink.vehicle import Vehicle
 
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 """MAV_RESULT."""
@@ -66,15 +65,17 @@ class Answer(NamedTuple):
 
 
 class CommandHandler:
-    """Carries out commands for a vehicle."""
+    """Carries out commands for a outbox."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, outbox: Outbox, services: Services) -> None:
         """Connect.
 
         Args:
-            vehicle: The vehicle the commands are for.
+            outbox: What the vehicle shares with its parts.
+            services: What keeps the parameters.
         """
-        self._vehicle = vehicle
+        self._outbox = outbox
+        self._services = services
         # The second entry: only systems that may fly are obeyed.
         self._handlers: dict[int, tuple[Callable[[CommandContext], Answer], bool]] = {
             ARM: (self._arm, True),
@@ -100,7 +101,7 @@ class CommandHandler:
         handler, guarded = self._handlers.get(command, (None, False))
         if handler is None:
             return Answer(UNSUPPORTED)
-        if guarded and not self._vehicle.lock.allowed(system_id):
+        if guarded and not self._outbox.lock.allowed(system_id):
             return Answer(DENIED)
         return handler(context)
 
@@ -113,34 +114,34 @@ class CommandHandler:
         Returns:
             MAV_RESULT.
         """
-        vehicle = self._vehicle
-        for mode in vehicle.modes:
+        outbox = self._outbox
+        for mode in outbox.modes:
             if mode.custom_mode == custom_mode:
-                if not vehicle.state.started:
+                if not outbox.state.started:
                     return TEMPORARILY_REJECTED
-                for request in requests_for(mode, vehicle.factory.aids_on):
-                    vehicle.request(request)
-                vehicle.board.say(INFO, f"Mode {mode.name}")
+                for request in requests_for(mode, outbox.factory.aids_on):
+                    outbox.request(request)
+                outbox.board.say(INFO, f"Mode {mode.name}")
                 return ACCEPTED
         return DENIED
 
     def _arm(self, context: CommandContext) -> Answer:
-        vehicle = self._vehicle
+        outbox = self._outbox
         wanted, force = context.values[0], context.values[1]
         if wanted not in {0.0, 1.0}:
             return Answer(DENIED)
-        if not vehicle.state.started:
+        if not outbox.state.started:
             return Answer(TEMPORARILY_REJECTED)
-        if wanted == 1.0 and force != _FORCE and not vehicle.state.armed:
-            sticks = vehicle.reader.sticks
-            live = context.now - sticks.received_ns * 1e-9 < vehicle.store[LOSS_TIME] and sticks.sequence > 0
+        if wanted == 1.0 and force != _FORCE and not outbox.state.armed:
+            sticks = outbox.reader.sticks
+            live = context.now - sticks.received_ns * 1e-9 < outbox.store[LOSS_TIME] and sticks.sequence > 0
             furthest = max(abs(sticks.stick), abs(sticks.lateral), abs(sticks.yaw))
-            if live and furthest > vehicle.store[ARM_NEUTRAL]:
-                vehicle.board.say_seldom("arm", WARNING, "Not armed: centre the sticks", context.now)
+            if live and furthest > outbox.store[ARM_NEUTRAL]:
+                outbox.board.say_seldom("arm", WARNING, "Not armed: centre the sticks", context.now)
                 return Answer(TEMPORARILY_REJECTED)
-        if vehicle.state.armed != bool(wanted):
-            vehicle.state.armed = bool(wanted)
-            vehicle.board.say(INFO, "Armed" if wanted else "Disarmed")
+        if outbox.state.armed != bool(wanted):
+            outbox.state.armed = bool(wanted)
+            outbox.board.say(INFO, "Armed" if wanted else "Disarmed")
         return Answer(ACCEPTED)
 
     def _set_mode(self, context: CommandContext) -> Answer:
@@ -155,10 +156,10 @@ class CommandHandler:
         target = context.values[0]
         if target not in {3.0, 4.0}:
             return Answer(DENIED)
-        if not self._vehicle.state.started:
+        if not self._outbox.state.started:
             return Answer(TEMPORARILY_REJECTED)
-        self._vehicle.request(Request("transition", "", target))
-        self._vehicle.board.say(INFO, "Converting to " + ("airplane" if target == 4.0 else "helicopter"))
+        self._outbox.request(Request("transition", "", target))
+        self._outbox.board.say(INFO, "Converting to " + ("airplane" if target == 4.0 else "helicopter"))
         return Answer(ACCEPTED)
 
     def _set_actuator(self, context: CommandContext) -> Answer:
@@ -169,21 +170,21 @@ class CommandHandler:
             return Answer(UNSUPPORTED)  # there is one actuator in one set
         if not -1.0 <= value <= 1.0:
             return Answer(DENIED)
-        if not self._vehicle.state.started:
+        if not self._outbox.state.started:
             return Answer(TEMPORARILY_REJECTED)
-        self._vehicle.request(Request("nacelle", "", deg(45.0 * (1.0 + value))))
+        self._outbox.request(Request("nacelle", "", deg(45.0 * (1.0 + value))))
         return Answer(ACCEPTED)
 
     def _reboot(self, context: CommandContext) -> Answer:
-        if not self._vehicle.config.reboot_resets:
+        if not self._outbox.config.reboot_resets:
             return Answer(UNSUPPORTED)
         if context.values[0] != 1.0:
             return Answer(DENIED)
-        self._vehicle.request(Request("reset"))
+        self._outbox.request(Request("reset"))
         return Answer(ACCEPTED)
 
     def _storage(self, context: CommandContext) -> Answer:
-        vehicle, path = self._vehicle, self._vehicle.config.parameter_file
+        outbox, path = self._outbox, self._outbox.config.parameter_file
         action = context.values[0]
         if action not in {0.0, 1.0, 2.0}:
             return Answer(DENIED)
@@ -191,39 +192,39 @@ class CommandHandler:
             return Answer(UNSUPPORTED)
         try:
             if action == 1.0:
-                vehicle.store.save(path or "")
+                outbox.store.save(path or "")
             elif action == 0.0:
-                vehicle.store.load(path or "")
+                outbox.store.load(path or "")
             else:
-                vehicle.store.defaults()
-        except (OSError, InputError) as failure:
-            vehicle.board.say(WARNING, f"Parameters: {failure}")
+                outbox.store.defaults()
+        except (OSError, InputError, OutputError) as failure:
+            outbox.board.say(WARNING, f"Parameters: {failure}")
             return Answer(FAILED)
         if action != 1.0:
-            vehicle.services.tell_all_parameters()
-        vehicle.board.say(NOTICE, ("Parameters loaded", "Parameters stored", "Parameters at defaults")[int(action)])
+            self._services.tell_all_parameters()
+        outbox.board.say(NOTICE, ("Parameters loaded", "Parameters stored", "Parameters at defaults")[int(action)])
         return Answer(ACCEPTED)
 
     def _request_message(self, context: CommandContext) -> Answer:
-        vehicle = self._vehicle
+        outbox = self._outbox
         number = _integer(context.values[0], 0, 0xFFFFFF)
         if number is None:
             return Answer(DENIED)
         if number == ids.AUTOPILOT_VERSION:
-            return Answer(ACCEPTED, (vehicle.factory.autopilot_version(),))
+            return Answer(ACCEPTED, (outbox.factory.autopilot_version(),))
         if number == ids.AVAILABLE_MODES:
-            place = _integer(context.values[1], 0, len(vehicle.modes), open_means=0)
+            place = _integer(context.values[1], 0, len(outbox.modes), open_means=0)
             if place is None:
                 return Answer(DENIED)
-            places = range(1, len(vehicle.modes) + 1) if place == 0 else (place,)
-            return Answer(ACCEPTED, tuple(vehicle.factory.available_modes(vehicle.modes, each) for each in places))
+            places = range(1, len(outbox.modes) + 1) if place == 0 else (place,)
+            return Answer(ACCEPTED, tuple(outbox.factory.available_modes(outbox.modes, each) for each in places))
         if number == ids.MESSAGE_INTERVAL:
             return self._interval_of(context.values[1], context.peer)
-        if not vehicle.factory.can_build(number):
+        if not outbox.factory.can_build(number):
             return Answer(UNSUPPORTED)
-        if not vehicle.state.started and number != ids.HEARTBEAT:
+        if not outbox.state.started and number != ids.HEARTBEAT:
             return Answer(TEMPORARILY_REJECTED)
-        return Answer(ACCEPTED, tuple(vehicle.factory.build(number)))
+        return Answer(ACCEPTED, tuple(outbox.factory.build(number)))
 
     def _set_interval(self, context: CommandContext) -> Answer:
         number = _integer(context.values[0], 0, 0xFFFFFF)
@@ -249,7 +250,7 @@ class CommandHandler:
     def _capabilities(self, context: CommandContext) -> Answer:
         if context.values[0] != 1.0:
             return Answer(DENIED)
-        return Answer(ACCEPTED, (self._vehicle.factory.autopilot_version(),))
+        return Answer(ACCEPTED, (self._outbox.factory.autopilot_version(),))
 
 
 def _integer(value: float, low: int, high: int, *, open_means: int | None = None) -> int | None:

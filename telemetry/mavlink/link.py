@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rtsim.arrays import FloatArray
 from rtsim.command import StickInput
 from rtsim.errors import OutputError
-from rtsim.frame import FloatArray
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
@@ -165,12 +165,7 @@ class MavlinkLink:
         return self.ready
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show a frame; about a microsecond, never waits.
-
-        Args:
-            row: The frame, shape (SIGNAL_COUNT,).
-            timing: Its wall-clock columns, shape (TIMING_COUNT,).
-        """
+        """Show a frame; about a microsecond, never waits."""
         self._ring.push(row, timing)
 
     def report(self, feedback: Feedback) -> None:

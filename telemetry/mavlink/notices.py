@@ -38,11 +38,7 @@ class NoticeBoard:
     """Collects texts and hands them out at a readable rate."""
 
     def __init__(self, now: float) -> None:
-        """Begin with nothing to say.
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """Begin with nothing to say."""
         self._waiting: deque[Notice] = deque()
         self._bucket = TokenBucket(_TEXTS_PER_S, _TEXT_BURST, now)
         self._said: dict[str, float] = {}
@@ -70,18 +66,13 @@ class NoticeBoard:
             key: The kind.
             severity: MAV_SEVERITY.
             text: The text.
-            now: Monotonic time [s].
         """
         if now - self._said.get(key, -1e9) >= _REPEAT_S:
             self._said[key] = now
             self.say(severity, text)
 
     def take(self, now: float) -> Notice | None:
-        """The next text, if it is time for one.
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """The next text, if it is time for one."""
         if not self._waiting or not self._bucket.take(now):
             return None
         return self._waiting.popleft()
@@ -136,7 +127,6 @@ class NoticeBoard:
 
         Args:
             peer: The station.
-            now: Monotonic time [s].
         """
         if peer.last_heartbeat < 0.0:
             return

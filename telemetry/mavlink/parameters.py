@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rtsim.errors import InputError
+from rtsim.toml_file import read_toml
+from rtsim.whole_file import write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +153,7 @@ class ParameterStore:
             path: A TOML file; it is whole or not there.
 
         Raises:
-            OSError: It cannot be written.
+            OutputError: It cannot be written.
         """
         file = Path(path)
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -162,9 +163,7 @@ class ParameterStore:
             for parameter, value in zip(self.declared, self._values, strict=True)
             if parameter.stored and value != parameter.default
         ]
-        temporary = file.with_name(f".{file.name}.part")
-        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        temporary.replace(file)
+        write_whole(file, "\n".join(lines) + "\n")
 
     def load(self, path: str | os.PathLike[str]) -> None:
         """Take stored values; a file that is not there changes nothing.
@@ -175,13 +174,10 @@ class ParameterStore:
         Raises:
             InputError: The file is wrong; nothing is taken from it then.
         """
-        before = list(self._values)
-        try:
-            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except FileNotFoundError:
+        if not Path(path).exists():
             return
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as failure:
-            raise InputError(f"cannot be read: {failure}", file=str(path), mend="correct or delete it") from None
+        values = read_toml(Path(path), noun="parameter")
+        before = list(self._values)
         for name, value in values.items():
             if name in self.index and not self.declared[self.index[name]].stored:
                 continue

@@ -36,16 +36,11 @@ class TokenBucket:
         Args:
             rate: Tokens per second.
             burst: Most tokens kept.
-            now: Monotonic time [s].
         """
         self._rate, self._burst, self._tokens, self._last = rate, burst, burst, now
 
     def take(self, now: float) -> bool:
-        """Take one token if there is one.
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """Take one token if there is one."""
         tokens = min(self._burst, self._tokens + (now - self._last) * self._rate)
         self._last = now
         if tokens < 1.0:
@@ -98,7 +93,6 @@ class PeerTable:
             own: Own system and component id.
             fastest_hz: Frame rate.
             key: Signing key, or None.
-            now: Monotonic time [s].
         """
         self._own, self._fastest_hz, self._key = own, fastest_hz, key
         self._links = 0
@@ -114,7 +108,6 @@ class PeerTable:
 
         Args:
             address: Where the frame came from.
-            now: Monotonic time [s].
         """
         peer = self.by_address.get(address)
         if peer is None:
@@ -125,11 +118,7 @@ class PeerTable:
         return peer
 
     def forget_silent(self, now: float) -> None:
-        """Drop learned stations that have been silent too long.
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """Drop learned stations that have been silent too long."""
         gone = [
             address
             for address, peer in self.by_address.items()

@@ -89,7 +89,6 @@ class OwnerLock:
 
         Args:
             pilot: Who sends.
-            now: Monotonic time [s].
             release_after: Silence after which the sticks are free [s].
         """
         if not self.allowed(pilot.system_id):
@@ -105,7 +104,6 @@ class OwnerLock:
         """Free the sticks of a silent owner.
 
         Args:
-            now: Monotonic time [s].
             release_after: Silence after which they are free [s].
 
         Returns:

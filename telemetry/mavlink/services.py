@@ -1,9 +1,15 @@
-"""The protocols beside commands: parameters, missions (there are none), time synchronisation, ping, files (none)."""
+"""The protocols beside commands: parameters, missions (there are none), time synchronisation, ping, files (none).
+
+Legend:
+    message: The request.
+    frame: Its frame.
+    peer: Who asked.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import all as dialect
@@ -11,12 +17,10 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.units import deg
 from telemetry.mavlink.exchange import Request
 from telemetry.mavlink.framing import Frame
+from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import AID_PARAMETERS, FLAP_COMMAND, NACELLE_COMMAND, PILOT, RESET, THROTTLE_TRIM
 from telemetry.mavlink.peers import Peer
 from telemetry.mavlink.state import PILOT_EXTERNAL, PILOT_HOLD, PILOT_MOCM
-
-if TYPE_CHECKING:
-    from telemetry.mavlink.vehicle import Vehicle
 
 Answerer = Callable[[Any, Frame, Peer], None]
 """Answers a message, given with its frame and its sender."""
@@ -41,17 +45,16 @@ _FTP_NAK, _FTP_FAIL = 129, 1
 
 
 class Services:
-    """Answers for a vehicle."""
+    """Answers for a outbox."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, outbox: Outbox) -> None:
         """Connect.
 
         Args:
-            vehicle: The vehicle that is asked.
+            outbox: What the vehicle shares with its parts.
         """
-        self._vehicle = vehicle
+        self._outbox = outbox
         self._settling: dict[str, float] = {}
-        self._set_after_reset: set[str] | None = None
         self.answers: dict[int, Answerer] = {
             4: self.ping,
             20: self.read_parameter,
@@ -67,13 +70,7 @@ class Services:
     # Parameters
 
     def list_parameters(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
-        """Begin to send all parameters; a list under way goes on.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Begin to send all parameters; a list under way goes on."""
         peer.parameter_next = max(peer.parameter_next, 0)
 
     def continue_list(self, peer: Peer) -> None:
@@ -82,85 +79,69 @@ class Services:
         Args:
             peer: Who asked for it.
         """
-        store = self._vehicle.store
+        store = self._outbox.store
         for _ in range(PARAMETERS_PER_TICK):
             if not 0 <= peer.parameter_next < len(store):
                 peer.parameter_next = -1
                 return
-            self._vehicle.send(peer, self._value_message(peer.parameter_next))
+            self._outbox.send(peer, self._value_message(peer.parameter_next))
             peer.parameter_next += 1
 
     def read_parameter(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer PARAM_REQUEST_READ, by index or name.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
-        store = self._vehicle.store
+        """Answer PARAM_REQUEST_READ, by index or name."""
+        store = self._outbox.store
         name = _name(message.param_id)
         place = store.index.get(name, -1) if message.param_index < 0 else message.param_index
         if 0 <= place < len(store):
-            self._vehicle.reply(peer, self._value_message(place))
+            self._outbox.reply(peer, self._value_message(place))
         else:
             self._parameter_error(frame, peer, name, message.param_index, _NOT_FOUND)
 
     def set_parameter(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer PARAM_SET: everybody hears the value now in force.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
-        vehicle = self._vehicle
+        """Answer PARAM_SET: everybody hears the value now in force."""
+        outbox = self._outbox
         name = _name(message.param_id)
-        place = vehicle.store.index.get(name)
+        place = outbox.store.index.get(name)
         if place is None:
             self._parameter_error(frame, peer, name, -1, _NOT_FOUND)
             return
-        before = vehicle.store[name]
+        before = outbox.store[name]
         error = 0
-        if not vehicle.lock.allowed(frame.system_id):
+        if not outbox.lock.allowed(frame.system_id):
             error = _READ_ONLY
-        elif message.param_type != _REAL32 or vehicle.store.set(name, _shortest(message.param_value)) is None:
+        elif message.param_type != _REAL32 or outbox.store.set(name, _shortest(message.param_value)) is None:
             error = _OUT_OF_RANGE
         if error:
             self._parameter_error(frame, peer, name, place, error)
-            vehicle.reply(peer, self._value_message(place))
+            outbox.reply(peer, self._value_message(place))
             return
-        self.hand_over(name, vehicle.now)
-        if vehicle.store[name] == before:
-            vehicle.reply(peer, self._value_message(place))
+        self.hand_over(name, outbox.now)
+        if outbox.store[name] == before:
+            outbox.reply(peer, self._value_message(place))
         else:
-            vehicle.broadcast(self._value_message(place))
+            outbox.broadcast(self._value_message(place))
 
     def tell_all_parameters(self) -> None:
         """Hand every value to the flight (after a load) and show them to everybody."""
-        vehicle = self._vehicle
-        for parameter in vehicle.store.declared:
+        outbox = self._outbox
+        for parameter in outbox.store.declared:
             if parameter.stored:
-                self.hand_over(parameter.name, vehicle.now)
-        for peer in vehicle.peers.by_address.values():
+                self.hand_over(parameter.name, outbox.now)
+        for peer in outbox.peers.by_address.values():
             if peer.last_heard > 0.0:
                 peer.parameter_next = 0
 
     def follow_flight(self, now: float) -> None:
-        """Let the parameters of pilot and aids say what is true, also after buttons, keys and modes.
-
-        Args:
-            now: Monotonic time [s].
-        """
-        vehicle = self._vehicle
-        if not vehicle.state.started:
+        """Let the parameters of pilot and aids say what is true, also after buttons, keys and modes."""
+        outbox = self._outbox
+        if not outbox.state.started:
             return
-        present = {AID_PARAMETERS[aid][0]: float(on) for aid, on in vehicle.factory.aids_on.items()}
-        present[PILOT] = float(vehicle.state.pilot)
+        present = {AID_PARAMETERS[aid][0]: float(on) for aid, on in outbox.factory.aids_on.items()}
+        present[PILOT] = float(outbox.state.pilot)
         for name, value in present.items():
-            if vehicle.store[name] != value and now >= self._settling.get(name, 0.0):
-                vehicle.store.set(name, value)
-                vehicle.broadcast(self._value_message(vehicle.store.index[name]))
+            if outbox.store[name] != value and now >= self._settling.get(name, 0.0):
+                outbox.store.set(name, value)
+                outbox.broadcast(self._value_message(outbox.store.index[name]))
 
     def show_commands(self, values: Mapping[str, float]) -> None:
         """Let parameters that are commands say where the flight stands, as it does at a start.
@@ -170,126 +151,95 @@ class Services:
         Args:
             values: By name.
         """
-        vehicle = self._vehicle
-        kept, self._set_after_reset = self._set_after_reset or set(), None
+        outbox = self._outbox
+        kept, self._outbox.set_after_reset = self._outbox.set_after_reset or set(), None
         for name, value in values.items():
-            if name not in kept and vehicle.store[name] != value:
-                vehicle.store.set(name, value)
-                vehicle.broadcast(self._value_message(vehicle.store.index[name]))
-
-    def expect_reset(self) -> None:
-        """The flight was asked to start again: what is set from now on acts after that."""
-        self._set_after_reset = set()
+            if name not in kept and outbox.store[name] != value:
+                outbox.store.set(name, value)
+                outbox.broadcast(self._value_message(outbox.store.index[name]))
 
     def hand_over(self, name: str, now: float) -> None:
         """Pass a changed parameter on to the flight.
 
         Args:
             name: The parameter.
-            now: Monotonic time [s].
         """
-        vehicle = self._vehicle
-        value = vehicle.store[name]
+        outbox = self._outbox
+        value = outbox.store[name]
         self._settling[name] = now + SETTLING_S
         if name == RESET:
             if value == 1.0:
-                vehicle.request(Request("reset"))
-            vehicle.store.set(RESET, 0.0)
+                outbox.request(Request("reset"))
+            outbox.store.set(RESET, 0.0)
             return
-        if self._set_after_reset is not None:
-            self._set_after_reset.add(name)
+        if self._outbox.set_after_reset is not None:
+            self._outbox.set_after_reset.add(name)
         if name == PILOT:
-            vehicle.request(Request("pilot", _PILOT_NAMES[int(value)]))
+            outbox.request(Request("pilot", _PILOT_NAMES[int(value)]))
             return
         if name == NACELLE_COMMAND:
-            vehicle.request(Request("nacelle", "", deg(value)))
+            outbox.request(Request("nacelle", "", deg(value)))
             return
         if name == FLAP_COMMAND:
-            vehicle.request(Request("flaps", "", deg(value)))
+            outbox.request(Request("flaps", "", deg(value)))
             return
         if name == THROTTLE_TRIM:
-            vehicle.request(Request("throttle", "", value / 100.0))
+            outbox.request(Request("throttle", "", value / 100.0))
             return
         for aid, (parameter, _) in AID_PARAMETERS.items():
             if parameter == name:
-                vehicle.request(Request("aid", aid, value))
+                outbox.request(Request("aid", aid, value))
                 return
-        vehicle.request(Request("parameter", name, value))
+        outbox.request(Request("parameter", name, value))
 
     def _value_message(self, place: int) -> Any:
-        parameter, value = self._vehicle.store.at(place)
+        parameter, value = self._outbox.store.at(place)
         return dialect.MAVLink_param_value_message(
-            parameter.name.encode(), value, _REAL32, len(self._vehicle.store), place
+            parameter.name.encode(), value, _REAL32, len(self._outbox.store), place
         )
 
     def _parameter_error(self, frame: Frame, peer: Peer, name: str, place: int, error: int) -> None:
         place = place if -1 <= place <= 32767 else -1
         text = name.encode("ascii", "replace")[:16]
-        self._vehicle.reply(
+        self._outbox.reply(
             peer, dialect.MAVLink_param_error_message(frame.system_id, frame.component_id, text, place, error)
         )
 
     # Missions: none, said at once, since silence costs a ground station many seconds
 
     def mission_count(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer MISSION_REQUEST_LIST: nothing is stored.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer MISSION_REQUEST_LIST: nothing is stored."""
         answer = dialect.MAVLink_mission_count_message(frame.system_id, frame.component_id, 0, message.mission_type)
-        self._vehicle.reply(peer, answer)
+        self._outbox.reply(peer, answer)
 
     def mission_result(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Answer any other mission request.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer any other mission request."""
         result = _MISSION_RESULTS[frame.message_id]
         answer = dialect.MAVLink_mission_ack_message(
             frame.system_id, frame.component_id, result, getattr(message, "mission_type", 0)
         )
-        self._vehicle.reply(peer, answer)
+        self._outbox.reply(peer, answer)
 
     # Clocks
 
     def timesync(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
-        """Answer a TIMESYNC request with the simulated time.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Answer a TIMESYNC request with the simulated time."""
         if message.tc1 == 0:
-            now_ns = self._vehicle.state.boot_ns(self._vehicle.now)
-            self._vehicle.reply(peer, dialect.MAVLink_timesync_message(now_ns, message.ts1))
+            now_ns = self._outbox.state.boot_ns(self._outbox.now)
+            self._outbox.reply(peer, dialect.MAVLink_timesync_message(now_ns, message.ts1))
 
     def ping(self, message: Any, frame: Frame, peer: Peer) -> None:
         """Answer a PING to its sender.
 
         Args:
             message: The ping.
-            frame: Its frame.
-            peer: Who asked.
         """
         if message.target_system == 0 and message.target_component == 0:
             answer = dialect.MAVLink_ping_message(message.time_usec, message.seq, frame.system_id, frame.component_id)
-            self._vehicle.reply(peer, answer)
+            self._outbox.reply(peer, answer)
 
     def refuse_file_transfer(self, message: Any, frame: Frame, peer: Peer) -> None:
-        """Say no to a file request, so that the client goes on without waiting.
-
-        Args:
-            message: The request.
-            frame: Its frame.
-            peer: Who asked.
-        """
+        """Say no to a file request, so that the client goes on without waiting."""
         asked = bytes(message.payload)
         sequence = (int.from_bytes(asked[:2], "little") + 1) & 0xFFFF
         payload = bytearray(251)
@@ -297,7 +247,7 @@ class Services:
         payload[2], payload[3], payload[4], payload[5] = asked[2], _FTP_NAK, 1, asked[3]
         payload[12] = _FTP_FAIL
         answer = dialect.MAVLink_file_transfer_protocol_message(0, frame.system_id, frame.component_id, list(payload))
-        self._vehicle.reply(peer, answer)
+        self._outbox.reply(peer, answer)
 
 
 def _shortest(value: float) -> float:

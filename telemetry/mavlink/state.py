@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.units import to_deg
 from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.mavlink.config import Ratings
@@ -53,7 +54,6 @@ class FlightState:
 
         Args:
             rows: Full rows (signals, then timing), oldest first.
-            now: Monotonic time [s].
 
         Returns:
             Whether the flight started again in them (a reset).
@@ -84,11 +84,7 @@ class FlightState:
         return number if math.isfinite(number) else 0.0
 
     def boot_ns(self, now: float) -> int:
-        """Simulated time of this moment: the newest row's, carried on for up to two frames [ns].
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """Simulated time of this moment: the newest row's, carried on for up to two frames [ns]."""
         ahead = min(max(now - self._arrival_s, 0.0), 2.0 / self.rate_hz) if self.started else 0.0
         return int((self.boot_s + ahead) * 1e9)
 

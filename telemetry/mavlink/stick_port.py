@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from telemetry.mavlink.exchange import ACCEPTED, Request
 from telemetry.mavlink.framing import Frame
 from telemetry.mavlink.notices import INFO, WARNING
+from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import AID_PARAMETERS, LEVER_RANGE, LOSS_TIME, OWNER_TIME
 from telemetry.mavlink.peers import Peer
 from telemetry.mavlink.pilot_input import PilotId
-
-if TYPE_CHECKING:
-    from telemetry.mavlink.vehicle import Vehicle
 
 MANUAL_CONTROL, OVERRIDE = 69, 70
 """Ids of the two messages that carry sticks."""
@@ -21,15 +19,15 @@ FLAP_STEPS = {"flaps_up": "up", "flaps_down": "down"}
 
 
 class StickPort:
-    """Takes sticks for a vehicle."""
+    """Takes sticks for a outbox."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, outbox: Outbox) -> None:
         """Connect.
 
         Args:
-            vehicle: The vehicle that is flown.
+            outbox: What the vehicle shares with its parts.
         """
-        self._vehicle = vehicle
+        self._outbox = outbox
         self._explained = False
         self._pilot: PilotId | None = None
 
@@ -42,35 +40,35 @@ class StickPort:
             peer: Where it came from.
             received_ns: When it arrived, monotonic [ns].
         """
-        vehicle, board, now = self._vehicle, self._vehicle.board, self._vehicle.now
+        outbox, board, now = self._outbox, self._outbox.board, self._outbox.now
         manual = frame.message_id == MANUAL_CONTROL
         target = message.target if manual else message.target_system
-        if target not in {0, vehicle.config.system_id}:
+        if target not in {0, outbox.config.system_id}:
             return
         pilot = PilotId(frame.system_id, frame.component_id, peer.address)
-        before = vehicle.lock.owner
-        if not vehicle.lock.claim(pilot, now, release_after=vehicle.store[OWNER_TIME]):
-            if vehicle.lock.allowed(frame.system_id):
+        before = outbox.lock.owner
+        if not outbox.lock.claim(pilot, now, release_after=outbox.store[OWNER_TIME]):
+            if outbox.lock.allowed(frame.system_id):
                 board.say_seldom(f"refused {pilot}", WARNING, f"Sticks are held by {before}, not {pilot}", now)
             else:
                 board.say_seldom("whitelist", WARNING, f"System {frame.system_id} may not fly", now)
             return
-        silent = received_ns - vehicle.reader.sticks.received_ns > vehicle.store[LOSS_TIME] * 1e9
+        silent = received_ns - outbox.reader.sticks.received_ns > outbox.store[LOSS_TIME] * 1e9
         if silent or pilot != self._pilot:  # what was held before must not come back with the first packet
-            vehicle.reader.forget(buttons=pilot != self._pilot)
+            outbox.reader.forget(buttons=pilot != self._pilot)
             self._pilot = pilot
-        if before != vehicle.lock.owner:
+        if before != outbox.lock.owner:
             board.say(INFO, f"Sticks: {pilot}")
         if manual:
-            bipolar = vehicle.store[LEVER_RANGE] == 1.0
-            pressed = vehicle.reader.manual_control(message, received_ns=received_ns, pilot=pilot, bipolar=bipolar)
+            bipolar = outbox.store[LEVER_RANGE] == 1.0
+            pressed = outbox.reader.manual_control(message, received_ns=received_ns, pilot=pilot, bipolar=bipolar)
             for function in pressed:
                 self._press(function)
         else:
-            vehicle.reader.override(message, received_ns=received_ns, pilot=pilot)
-        sticks = vehicle.reader.sticks
-        vehicle.exchange.write_sticks(sticks)
-        vehicle.exchange.header[ACCEPTED] += 1
+            outbox.reader.override(message, received_ns=received_ns, pilot=pilot)
+        sticks = outbox.reader.sticks
+        outbox.exchange.write_sticks(sticks)
+        outbox.exchange.header[ACCEPTED] += 1
         if not self._explained and max(abs(sticks.lateral), abs(sticks.yaw)) > 0.2:
             self._explained = True
             board.say(INFO, "Roll and yaw are shown but do not act")
@@ -78,11 +76,11 @@ class StickPort:
     def _press(self, function: str) -> None:
         """A button that acts once went down."""
         if function in AID_PARAMETERS:
-            if function in self._vehicle.config.aids:
-                self._vehicle.request(Request("aid", function, 2.0))
+            if function in self._outbox.config.aids:
+                self._outbox.request(Request("aid", function, 2.0))
         elif function == "freeze":
-            self._vehicle.request(Request("freeze"))
+            self._outbox.request(Request("freeze"))
         elif function in FLAP_STEPS:
-            self._vehicle.request(Request("flaps", FLAP_STEPS[function]))
+            self._outbox.request(Request("flaps", FLAP_STEPS[function]))
         elif function == "pilot":
-            self._vehicle.request(Request("pilot", "next"))
+            self._outbox.request(Request("pilot", "next"))

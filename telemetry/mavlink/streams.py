@@ -37,7 +37,6 @@ class StreamSchedule:
         """Start all streams at their default rates.
 
         Args:
-            now: Monotonic time [s].
             fastest_hz: Rate above which nothing is sent: the frame rate.
         """
         self._shortest = 1.0 / fastest_hz
@@ -64,7 +63,6 @@ class StreamSchedule:
         Args:
             message_id: One of ``DEFAULT_RATES_HZ``.
             interval_us: Microseconds between messages; negative stops, 0 takes the default.
-            now: Monotonic time [s].
         """
         if interval_us < 0.0:
             interval = math.inf
@@ -84,11 +82,7 @@ class StreamSchedule:
         return self._due[0][0] if self._due else math.inf
 
     def take_due(self, now: float) -> list[int]:
-        """Ids that are due, each once; what was missed is not made up for.
-
-        Args:
-            now: Monotonic time [s].
-        """
+        """Ids that are due, each once; what was missed is not made up for."""
         due: list[int] = []
         while self._due and self._due[0][0] <= now:
             moment, number, interval = self._due[0]

@@ -12,24 +12,21 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import FloatArray
 from telemetry.mavlink import messages as ids
 from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler, command_values
-from telemetry.mavlink.config import MavlinkConfig, read_signing_key
+from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import (
     ARMED,
     DISCARDED,
     PEERS,
     RECEIVED,
-    SENT,
     Exchange,
-    Request,
 )
 from telemetry.mavlink.framing import Frame, SignatureCheck, decode, frames
-from telemetry.mavlink.messages import MessageFactory
-from telemetry.mavlink.modes import offered_modes
-from telemetry.mavlink.notices import INFO, WARNING, NoticeBoard
+from telemetry.mavlink.notices import INFO, WARNING
+from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import (
     FLAP_COMMAND,
     NACELLE_COMMAND,
@@ -38,10 +35,9 @@ from telemetry.mavlink.parameters import (
     WARNINGS,
     ParameterStore,
 )
-from telemetry.mavlink.peers import Address, Peer, PeerTable
-from telemetry.mavlink.pilot_input import OwnerLock, StickReader
+from telemetry.mavlink.peers import Address, Peer
 from telemetry.mavlink.services import Services
-from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST, FlightState
+from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST
 from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
 
 LONGEST_PAUSE_S = 0.02
@@ -50,7 +46,7 @@ _LIST_PAUSE_S = 0.004
 _GROUND_HEARTBEAT, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 11, 75, 76
 
 
-class Vehicle:
+class Vehicle(Outbox):
     """One XV-15 as ground stations see it."""
 
     def __init__(
@@ -62,29 +58,14 @@ class Vehicle:
             config: Its settings.
             exchange: Shared memory to the flight.
             send: Sends a datagram; must not wait and not raise.
-            now: Monotonic time [s].
 
         Raises:
             InputError: A setting, the signing key or the stored parameters are wrong.
         """
-        self.config = config
-        self.now = now
-        """Time of the newest call, monotonic [s]."""
-        self.state = FlightState(config.rate_hz, config.ratings)
-        self.store = ParameterStore(config.aids, config.parameters)
-        self.factory = MessageFactory(config, self.state)
-        self.modes = offered_modes(config.aids)
-        self.board = NoticeBoard(now)
-        self.lock = OwnerLock(config.whitelist)
-        self.reader = StickReader(config.axes, config.buttons)
-        key = read_signing_key(config.signing_key_file) if config.signing_key_file else None
-        self._signatures = SignatureCheck(key) if key else None
-        targets = tuple((target.host, target.port) for target in config.targets)
-        self.peers = PeerTable(
-            targets, own=(config.system_id, config.component_id), fastest_hz=config.rate_hz, key=key, now=now
-        )
+        super().__init__(config, exchange, send=send, now=now)
+        self._signatures = SignatureCheck(self.signing_key) if self.signing_key else None
         self.services = Services(self)
-        self._commands = CommandHandler(self)
+        self._commands = CommandHandler(self, self.services)
         self._stick_port = StickPort(self)
         self._answers = {
             **self.services.answers,
@@ -93,9 +74,6 @@ class Vehicle:
             _COMMAND_LONG: self._take_command,
         }
         self._handled = {*self._answers, _GROUND_HEARTBEAT, MANUAL_CONTROL, OVERRIDE}
-        self.exchange = exchange
-        """Shared memory to the flight."""
-        self._send = send
         self._decoder = dialect.MAVLink(None)
         self._identity: tuple[int, ...] = ()
         self._vtol_state = 0
@@ -112,7 +90,6 @@ class Vehicle:
             datagram: What came.
             address: From where.
             received_ns: When, monotonic [ns].
-            now: Monotonic time [s].
         """
         self.now = now
         self.exchange.header[RECEIVED] += 1
@@ -194,7 +171,6 @@ class Vehicle:
 
         Args:
             rows: Full rows, oldest first; may be empty.
-            now: Monotonic time [s].
         """
         starts = not self.state.started
         if self.state.observe(rows, now):
@@ -209,53 +185,10 @@ class Vehicle:
                 }
             )
 
-    def request(self, request: Request) -> None:
-        """Ask the flight for something.
-
-        Args:
-            request: What.
-        """
-        if request.kind == "reset":
-            self.services.expect_reset()
-        if not self.exchange.put_request(request):
-            self.board.say_seldom("queue", WARNING, "The flight does not listen", self.now)
-
     # Sending
-
-    def send(self, peer: Peer, message: Any) -> None:
-        """Send a message to one station.
-
-        Args:
-            peer: The station.
-            message: A pymavlink message.
-        """
-        self._send(self.peers.pack(peer, message), peer.address)
-        self.exchange.header[SENT] += 1
-
-    def reply(self, peer: Peer, message: Any) -> None:
-        """Answer one station, unless it has used up its answers for now.
-
-        Args:
-            peer: The station.
-            message: A pymavlink message.
-        """
-        if peer.replies.take(self.now):
-            self.send(peer, message)
-
-    def broadcast(self, message: Any) -> None:
-        """Send a message to every station.
-
-        Args:
-            message: A pymavlink message.
-        """
-        for peer in self.peers.by_address.values():
-            self.send(peer, message)
 
     def tick(self, now: float) -> float:
         """Do what is due.
-
-        Args:
-            now: Monotonic time [s].
 
         Returns:
             When to call again at the latest, monotonic [s].

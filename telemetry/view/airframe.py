@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 from rtsim.units import INCH
 
 ROTOR_RADIUS = 3.81

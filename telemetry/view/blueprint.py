@@ -7,12 +7,12 @@ from typing import Any
 import rerun as rr
 import rerun.blueprint as rrb
 
+from telemetry.log.signal_groups import plot_groups
 from telemetry.view import corridor as rerun_corridor
 from telemetry.view import instruments as rerun_instruments
 from telemetry.view.colours import BACKGROUND
 from telemetry.view.options import Layout
 from telemetry.view.plots import PILOT_PLOTS
-from telemetry.view.signal_groups import plot_groups
 
 SHOWN_SECONDS = 30.0
 """Length of the time histories that follow the flight [s]."""

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.colours import CYAN, DIM, FRAME, GRID, HIGH_SIDE, LEVELS, LOW_SIDE, TEXT, TRAIL, WHITE
-from telemetry.view.corridor_outline import CorridorOutline
 from telemetry.view.strokes import LineArt
 
 UNITS_PER_DEGREE = 2.7
@@ -59,11 +60,7 @@ class CorridorPlot:
         recording.log("corridor/static", axes.archetype(0.0), static=True)
 
     def update(self, row: FloatArray) -> None:
-        """Show the point, its margins and its trail.
-
-        Args:
-            row: A frame's signals.
-        """
+        """Show the point, its margins and its trail."""
         speed, nacelle = float(row[COLUMN.airspeed_kt]), float(row[COLUMN.nacelle_deg])
         if self._updates % 2 == 0:
             margins = LineArt()
@@ -107,11 +104,7 @@ class CorridorPlot:
 
 
 def level_of(row: FloatArray) -> int:
-    """Corridor level of a row as an index, 0 clear to 3 exceedance.
-
-    Args:
-        row: A frame's signals.
-    """
+    """Corridor level of a row as an index, 0 clear to 3 exceedance."""
     level = row[COLUMN.corridor_level]
     return int(level) if 0.0 <= level <= 3.0 else 0
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from telemetry.view.colours import (
     ACTING,
     AMBER,
@@ -72,11 +73,7 @@ class Instruments:
         self._static("instruments/faces", _faces(), 5.0)
 
     def update(self, row: FloatArray) -> None:
-        """Show one row.
-
-        Args:
-            row: A frame's signals.
-        """
+        """Show one row."""
         shift = {
             "ball": _PITCH_SCALE * float(row[COLUMN.pitch_deg]),
             "speed_tape": _SPEED_SCALE * float(row[COLUMN.airspeed_kt]),

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.log.format import LOG_SIGNALS
+from telemetry.log.signal_groups import label, plot_groups
 from telemetry.view.colours import SERIES
 from telemetry.view.corridor import level_of
-from telemetry.view.signal_groups import label, plot_groups
 
 MODE_NAMES = ("HELICOPTER", "CONVERSION", "AIRPLANE")
 """States of the mode strip's first line."""
@@ -144,11 +145,7 @@ class Plots:
 
 
 def acting_on(row: FloatArray) -> int:
-    """What the protection law changes in a row: 1 the stick, 2 the lever, 4 the nacelles, or their sum.
-
-    Args:
-        row: A frame's signals.
-    """
+    """What the protection law changes in a row: 1 the stick, 2 the lever, 4 the nacelles, or their sum."""
     return sum(1 << place for place, column in enumerate(_REASONS) if row[column])
 
 
@@ -157,7 +154,6 @@ def set_row_time(recording: Any, row: FloatArray) -> None:
 
     Args:
         recording: The ``rerun.RecordingStream``.
-        row: A frame's signals.
     """
     recording.set_time("sim_time", duration=float(row[COLUMN.time_s]))
     recording.set_time("step", sequence=int(row[COLUMN.frame]))

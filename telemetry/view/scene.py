@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN
 from telemetry.view import airframe
 from telemetry.view.colours import CYAN, LEFT_ROTOR, RIGHT_ROTOR, TRAIL
 
@@ -51,7 +52,6 @@ class Scene:
         """Show the aircraft as it is in one row.
 
         Args:
-            row: A frame's signals.
             trail: The place is part of the path.
         """
         time_s, nacelle = float(row[COLUMN.time_s]), math.radians(row[COLUMN.nacelle_deg])

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.blueprint import blueprint
 from telemetry.view.corridor import CorridorPlot
-from telemetry.view.corridor_outline import CorridorOutline
 from telemetry.view.instruments import Instruments
 from telemetry.view.options import ViewOptions, partial_name
 from telemetry.view.plots import Plots, history_of, set_row_time

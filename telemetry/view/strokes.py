@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import rerun as rr
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import FloatArray
 
 Colour = tuple[int, int, int] | tuple[int, int, int, int]
 Align = Literal["left", "centre", "right"]

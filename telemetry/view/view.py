@@ -19,11 +19,11 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from rtsim.frame import FloatArray
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import Ring
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions, partial_name
 
 GIVEN_UP = 3
@@ -118,12 +118,7 @@ class RerunView:
         return self._ready
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
-        """Show one row; never waits.
-
-        Args:
-            row: The frame's signals, shape (SIGNAL_COUNT,).
-            timing: Its wall-clock columns, shape (TIMING_COUNT,).
-        """
+        """Show one row; never waits."""
         self._ring.push(row, timing)
         self._pushes += 1
         if self._pushes % _ROWS_PER_WATCH == 0:

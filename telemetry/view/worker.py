@@ -20,7 +20,7 @@ from typing import Any
 from rtsim.errors import RtsimError
 from telemetry.exchange.child_process import lower_priority
 from telemetry.exchange.ring import RingReader
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions
 from telemetry.view.view import GIVEN_UP
 from telemetry.view.viewer import Viewer, quiet_environment

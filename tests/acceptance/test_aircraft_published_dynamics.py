@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.aircraft import INPUT, OUTPUT, STATE, STATES, Condition
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import INPUT, OUTPUT, STATE, STATES
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import DEGREE, FOOT, GRAVITY, HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, rpm, to_deg
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.aircraft import OUTPUT, STATE, Condition
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import FOOT, FOOT_POUND, HORSEPOWER, POUND_FORCE, deg, kt, rpm, to_deg
 

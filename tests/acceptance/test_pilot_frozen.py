@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.analysis.frozen_loop import Condition, frozen_loop, stability_map
+from rtsim.analysis.frozen_loop import FrozenCommand, frozen_loop, stability_map
 from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
@@ -39,7 +39,7 @@ def test_pi_form_grows_nowhere_faster_than_allowed(mid_cells: bool) -> None:
 @pytest.mark.parametrize(("airspeed_kt", "nacelle_deg"), TABLE_1)
 def test_margins_along_the_typical_conversion(airspeed_kt: float, nacelle_deg: float) -> None:
     """Acceptance bands: stick 0.8-4 rad/s, 20 deg, 4.5 dB; lever 0.15-2.5 rad/s, 20 deg, 4 dB."""
-    loop = frozen_loop(DATABASE, Condition(kt(airspeed_kt), deg(nacelle_deg)))
+    loop = frozen_loop(DATABASE, FrozenCommand(kt(airspeed_kt), deg(nacelle_deg)))
     margins = loop.margins()
     assert 0.8 <= margins.w_c[0] <= 4.0
     assert 0.15 <= margins.w_c[1] <= 2.5
@@ -51,13 +51,13 @@ def test_margins_along_the_typical_conversion(airspeed_kt: float, nacelle_deg: f
 @pytest.mark.parametrize("outer_loop", OUTER_LOOPS)
 def test_the_linear_map_predicts_the_flight(outer_loop: OuterLoop) -> None:
     """A small upset flown with the kernels for 8 s against powers of the frozen map."""
-    condition = Condition(kt(81.0), deg(75.0))
+    condition = FrozenCommand(kt(81.0), deg(75.0))
     loop = frozen_loop(DATABASE, condition, outer_loop=outer_loop)
     lpv, pilot = prepare_tables(DATABASE), load_pilot_tables(DATABASE, outer_loop)
     level = DATABASE.level_layer
     i = int(np.argmin(np.abs(DATABASE.airspeed - condition.airspeed)))
     j = int(np.argmin(np.abs(DATABASE.nacelle - condition.nacelle_angle)))
-    condition = Condition(float(DATABASE.airspeed[i]), float(DATABASE.nacelle[j]))
+    condition = FrozenCommand(float(DATABASE.airspeed[i]), float(DATABASE.nacelle[j]))
     loop = frozen_loop(DATABASE, condition, outer_loop=outer_loop)
     x, u = DATABASE.x_ref[level, i, j].copy(), DATABASE.u_ref[level, i, j].copy()
     names = [variable.name for variable in DATABASE.states]
@@ -86,7 +86,7 @@ def test_the_linear_map_predicts_the_flight(outer_loop: OuterLoop) -> None:
 
 
 def test_eigenvalues_are_rates_and_come_slowest_first() -> None:
-    loop = frozen_loop(DATABASE, Condition(0.0, deg(90.0)))
+    loop = frozen_loop(DATABASE, FrozenCommand(0.0, deg(90.0)))
     values = loop.eigenvalues()
     assert np.all(np.diff(values.real) <= 1e-12)
     assert loop.growth() == values[0].real

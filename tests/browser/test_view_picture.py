@@ -16,9 +16,9 @@ from matplotlib.image import imread
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import TIMING_COUNT
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view import viewer as rerun_viewer
 from telemetry.view.colours import GREEN, HIGH_SIDE, LOW_SIDE, SKY
-from telemetry.view.corridor_outline import CorridorOutline
 from telemetry.view.options import Layout, ViewOptions
 from telemetry.view.view import RerunView
 

@@ -8,14 +8,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rtsim.aids import SWITCHES
 from rtsim.aids.aids_kernels import MAP_STICK_FLAPS
+from rtsim.aids.design import SWITCHES
 from rtsim.aircraft.variables import STATE
 from rtsim.analysis.handling import handling
+from rtsim.arrays import FloatArray
 from rtsim.command import Command, Sensors
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.frame import COLUMN, FloatArray
+from rtsim.frame import COLUMN
 from rtsim.loop.setup import build_parts
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.aircraft import load_aircraft

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rtsim.atmosphere import AirSpecification, Gust, Turbulence
+from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, history_sha256

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.errors import InputError
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.measures.metrics import OBJECTIVES, FlightFigures, finished, measured, new_sums, objective_value

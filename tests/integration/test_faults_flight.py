@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.faults import Fault, FaultSwitch
 from rtsim.faults import fault_kernels as kernels
+from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.frame import COLUMN, history_sha256
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
-from rtsim.realtime import FlightControl
+from rtsim.realtime.control import FlightControl
 from rtsim.units import HORSEPOWER, deg, kt
 
 PLANTS = ["lpv", "nonlinear"]
@@ -173,7 +173,7 @@ other_engine = "takeoff"
 
 def test_scenario_to_log_to_replay(tmp_path):
     """A file with air and failures, live ones on top: events recorded, the log replays to the same hash."""
-    from rtsim.atmosphere import Gust, Turbulence
+    from rtsim.atmosphere.specification import Gust, Turbulence
     from scenarios import fly
     from scenarios.files.loader import parse_scenario
     from scenarios.flight.replay import replay_log

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rtsim.aircraft.variables import STATE
-from rtsim.atmosphere import AirSpecification, Turbulence
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.frame import COLUMN
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme

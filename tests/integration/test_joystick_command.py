@@ -16,7 +16,9 @@ import numpy as np
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import TIMING_COUNT
-from telemetry.mavlink import Endpoint, Feedback, MavlinkConfig, MavlinkLink
+from telemetry.mavlink.config import Endpoint, MavlinkConfig
+from telemetry.mavlink.exchange import Feedback
+from telemetry.mavlink.link import MavlinkLink
 
 
 def run(*options, **settings):

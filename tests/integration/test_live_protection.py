@@ -14,8 +14,8 @@ import pytest
 
 import scenarios
 from rtsim.cli.main import run
-from rtsim.protection import MarginMonitor
-from rtsim.realtime import FlightControl
+from rtsim.protection.monitor import MarginMonitor
+from rtsim.realtime.control import FlightControl
 from scenarios.files.options import Overrides
 from scenarios.flight.limit_watch import LimitWatch
 from scenarios.flight.replay import replay_log

@@ -12,10 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 
 import scenarios
+from rtsim.arrays import FloatArray
 from rtsim.cli.main import run
 from rtsim.errors import InputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
-from rtsim.realtime import FlightControl
+from rtsim.frame import COLUMN, SIGNAL_COUNT
+from rtsim.realtime.control import FlightControl
 from scenarios.files.options import Overrides
 from scenarios.flight.replay import first_difference, replay_log
 from scenarios.flight.runner import FlightOutputs

@@ -22,7 +22,7 @@ from rtsim.errors import EXIT_OUTPUT_FAILED, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import TIMING_COUNT
-from telemetry.view.corridor_outline import CorridorOutline
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions, display_available, partial_name
 from telemetry.view.view import RerunView
 

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import scenarios
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.frame import COLUMN, FloatArray
-from rtsim.realtime import FlightControl
+from rtsim.frame import COLUMN
+from rtsim.realtime.control import FlightControl
 from rtsim.units import deg, kt
 from scenarios.files.options import Overrides, chosen_scenario
 from scenarios.flight.result import FlightRecord

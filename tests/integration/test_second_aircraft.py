@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import scenarios
-from rtsim.aids import design_aids
 from rtsim.aids.aids_kernels import MAP_PITCH_DAMPING
+from rtsim.aids.design import design_aids
 from rtsim.aircraft.profile import parse_profile, xv15_profile
 from rtsim.aircraft.variables import position
 from rtsim.errors import InputError
-from rtsim.faults import Fault
+from rtsim.faults.fault import Fault
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database

@@ -13,15 +13,16 @@ import pytest
 
 import scenarios
 from rtsim.aircraft.variables import AUXILIARY_INPUTS
+from rtsim.arrays import FloatArray
 from rtsim.command import Command
 from rtsim.errors import InputError
-from rtsim.faults import Fault
-from rtsim.frame import COLUMN, FloatArray, history_sha256
+from rtsim.faults.fault import Fault
+from rtsim.frame import COLUMN, history_sha256
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database, save_database
 from rtsim.programme import Programme
-from rtsim.realtime import FlightControl
+from rtsim.realtime.control import FlightControl
 from rtsim.realtime.keys import press
 from rtsim.units import deg, kt
 from scenarios.campaign.trial import Bench

@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from rtsim.aircraft import INPUT, INPUTS, STATE, STATES, Condition
-from rtsim.aircraft.variables import FLAP_INPUTS
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15 import rotor_kernels
 from rtsim.aircraft.xv15.model import Xv15

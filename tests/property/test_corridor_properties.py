@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtsim.choices import CHART_NAMES
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.corridor.corridor_kernels import corridor_level_step, corridor_margins, new_level_state
 from rtsim.units import deg, kt
 

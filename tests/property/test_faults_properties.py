@@ -8,11 +8,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtsim.aircraft import STATE, STATES
+from rtsim.aircraft.variables import STATE, STATES
 from rtsim.aircraft.xv15.model import Xv15
-from rtsim.faults import Fault, fault_events
 from rtsim.faults import fault_kernels as kernels
-from rtsim.faults.fault import ACTUATORS
+from rtsim.faults.fault import ACTUATORS, Fault, fault_events
 from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.units import deg
 

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere.air import GUST_SHAPES, gust_tables, new_gust_state
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, gust_shape, gust_step
+from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
 
 DT = 0.01
 amplitudes = st.floats(-30.0, 30.0)

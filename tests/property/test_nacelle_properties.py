@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from rtsim.nacelle import NacelleActuator, NacelleSwitch, load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_at, nacelle_effective_rate
+from rtsim.nacelle.switch import NacelleActuator, NacelleSwitch, load_nacelle_tables
 from rtsim.units import deg, to_deg
 
 DT = 0.004

@@ -8,7 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS
 
 
 class CountingSource:

@@ -14,9 +14,9 @@ import pytest
 
 from rtsim.errors import InputError
 from rtsim.frame import TIMING_SIGNALS
-from rtsim.realtime import Executive, FlightControl, OverrunPolicy
-from rtsim.realtime.control import WARP_STEPS, neighbouring_warp
-from rtsim.realtime.executive import loop_conditions
+from rtsim.realtime.control import WARP_STEPS, FlightControl, neighbouring_warp
+from rtsim.realtime.executive import Executive, loop_conditions
+from rtsim.realtime.policy import OverrunPolicy
 
 
 def wait_for(condition: Callable[[], bool]) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.aircraft import INPUT, INPUTS, OUTPUT, STATE, STATES, Condition
 from rtsim.aircraft.atmosphere import standard_atmosphere
+from rtsim.aircraft.points import Condition
 from rtsim.aircraft.table_kernels import curve, surface
+from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, STATE, STATES
 from rtsim.aircraft.xv15 import airframe_kernels as airframe
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15 import tail_kernels

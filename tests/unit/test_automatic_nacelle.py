@@ -15,7 +15,6 @@ from rtsim.nacelle.automatic import (
     AutomaticNacelle,
     NacelleSchedule,
     ScheduledNacelle,
-    Table1Nacelle,
     centre_line_schedule,
     inactive_tables,
     programme_schedule,
@@ -112,9 +111,7 @@ def test_the_airspeed_filter_lets_gusts_pass():
 
 
 def test_the_plug_ins_follow_the_interface():
-    for kind in (ScheduledNacelle, Table1Nacelle):
-        assert isinstance(kind(), NacelleLaw)
-    assert Table1Nacelle().settings.schedule.at(kt(120.0)) == pytest.approx(deg(50.0))
+    assert isinstance(ScheduledNacelle(), NacelleLaw)
     moved = ScheduledNacelle(AutomaticNacelle(LINE))
     jammed = dataclasses.replace(SENSORS, nacelle_ok=False, nacelle_angle=deg(80.0))
     for _ in range(500):
@@ -274,14 +271,14 @@ def test_a_law_that_fails_is_named_and_left_out():
 def test_laws_are_found_by_module_and_class():
     assert load_nacelle_law("programme") is None
     assert load_nacelle_law("automatic") is None
-    factory = load_nacelle_law("rtsim.nacelle.automatic:Table1Nacelle")
+    factory = load_nacelle_law("rtsim.nacelle.automatic:ScheduledNacelle")
     assert factory is not None
-    assert isinstance(factory(), Table1Nacelle)
+    assert isinstance(factory(), ScheduledNacelle)
     for name, words in (
         ("manual", "is not a nacelle law"),
         ("no_such_module_here:Law", "there is no module no_such_module_here"),
         ("math:pi", "no class with a method step"),
-        ("rtsim.nacelle.automatic:Table1Nacele", "'Table1Nacelle' is meant"),
+        ("rtsim.nacelle.automatic:ScheduledNacele", "'ScheduledNacelle' is meant"),
         (":Law", "is half a name"),
         (f"{__name__}:Missing", "has no class Missing"),
     ):
@@ -294,9 +291,9 @@ def test_laws_are_found_by_module_and_class():
 
 
 def test_laws_of_installed_packages_are_found_by_name(monkeypatch):
-    point = EntryPoint("table", "rtsim.nacelle.automatic:Table1Nacelle", NACELLE_PLUGIN.entry_point_group)
+    point = EntryPoint("table", "rtsim.nacelle.automatic:ScheduledNacelle", NACELLE_PLUGIN.entry_point_group)
     monkeypatch.setattr(plugins, "entry_points", lambda group: [point] if group == point.group else [])
     factory = load_nacelle_law("table")
     assert factory is not None
-    assert isinstance(factory(), Table1Nacelle)
+    assert isinstance(factory(), ScheduledNacelle)
     assert parsed('"table"').options.nacelle == "table"

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.cli.output import console, emit_json, progress, results, to_jsonable, whole_file
+from rtsim.cli.output import console, emit_json, progress, results, to_jsonable
 from rtsim.errors import OutputError
+from rtsim.whole_file import whole_file
 
 
 class Colour(Enum):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rtsim.choices import CHART_NAMES
-from rtsim.corridor import Boundary, load_corridor
+from rtsim.corridor.boundaries import Boundary, load_corridor
 from rtsim.corridor.corridor_kernels import corridor_level_step, new_level_state
 from rtsim.errors import InputError
 from rtsim.units import deg, kt, to_deg, to_kt

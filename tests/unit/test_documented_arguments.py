@@ -1,4 +1,4 @@
-"""Every public object says what it is, and every argument of a public function has an entry under ``Args:``."""
+"""Every public object says what it is; every argument of a public function stands under ``Args:`` or in a legend."""
 
 from __future__ import annotations
 
@@ -69,28 +69,37 @@ def public_classes(module):
             yield name, member
 
 
-def documented_arguments(docstring):
-    """Names that stand as ``name:`` at one indent under ``Args:``."""
-    text = inspect.cleandoc(docstring)
-    section = re.search(r"^Args:\n((?:[ ]+.*\n?|\n)*)", text, flags=re.MULTILINE)
+def described(docstring, heading):
+    """What stands as ``name: text`` at one indent under a heading."""
+    section = re.search(rf"^{heading}:\n((?:[ ]+.*\n?|\n)*)", inspect.cleandoc(docstring or ""), flags=re.MULTILINE)
     if section is None:
-        return set()
-    return set(re.findall(r"^ {4}\*{0,2}(\w+)(?: \([^)]*\))?:", section.group(1), flags=re.MULTILINE))
+        return {}
+    found = re.findall(
+        r"^ {4}\*{0,2}(\w+)(?: \([^)]*\))?: ?((?:.*\n?)(?: {5,}.*\n?)*)", section.group(1), flags=re.MULTILINE
+    )
+    return {name: " ".join(text.split()) for name, text in found}
 
 
-def faults_of(qualified_name, function):
+def legend_of(module):
+    """Names that need no entry: those that mean the same everywhere, and those that the module declares."""
+    return described(rtsim.__doc__, "Legend") | described(module.__doc__, "Legend")
+
+
+def faults_of(qualified_name, function, legend):
     arguments = [name for name in inspect.signature(function).parameters if name not in {"self", "cls"}]
     is_init = qualified_name.endswith("__init__")
     if is_init and (not arguments or (function.__doc__ is None and generated(function))):
         return []
     if not function.__doc__:
         return [f"{qualified_name}: no docstring"]
-    documented = documented_arguments(function.__doc__)
+    own = described(function.__doc__, "Args")
     if told_by_help(function):
-        return [f"{qualified_name}: describes {name} again, which --help does" for name in documented]
-    missing = [f"{qualified_name}: argument {name} is not described" for name in arguments if name not in documented]
-    stale = [f"{qualified_name}: describes {name}, which it does not take" for name in documented - set(arguments)]
-    return missing + stale
+        return [f"{qualified_name}: describes {name} again, which --help does" for name in own]
+    missing = [name for name in arguments if name not in own and name not in legend]
+    faults = [f"{qualified_name}: argument {name} is not described" for name in missing]
+    faults += [f"{qualified_name}: describes {name}, which it does not take" for name in own if name not in arguments]
+    repeated = [name for name, text in own.items() if legend.get(name) == text]
+    return faults + [f"{qualified_name}: describes {name} again, which the legend does" for name in repeated]
 
 
 def generated(function):
@@ -104,24 +113,29 @@ def test_public_objects_are_documented(name):
     faults = [] if module.__doc__ else [f"{name}: the module has no docstring"]
     faults += [f"{class_name}: no docstring" for class_name, member in public_classes(module) if not member.__doc__]
     for qualified_name, function in public_functions(module):
-        faults += faults_of(qualified_name, function)
+        faults += faults_of(qualified_name, function, legend_of(module))
     assert faults == []
 
 
-def sample(first, second):
+def sample(first, second, dt, row):
     """Do something.
 
     Args:
         first: Described, with a colon: inside.
         third: Not an argument.
+        dt: Length
+            of a frame [s].
+        row: What is special here.
     """
 
 
-def test_an_undocumented_argument_would_be_found():
-    assert faults_of("sample", sample) == [
+def test_what_is_missing_stale_or_repeated_would_be_found():
+    assert faults_of("sample", sample, {"dt": "Length of a frame [s].", "row": "A row."}) == [
         "sample: argument second is not described",
         "sample: describes third, which it does not take",
+        "sample: describes dt again, which the legend does",
     ]
+    assert legend_of(rtsim)["dt"] == "Length of a frame [s]."
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)

@@ -15,13 +15,31 @@ import numpy as np
 import pytest
 from scipy import linalg, signal
 
-from rtsim.atmosphere import AirSpecification, Turbulence
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere.air import gust_tables, new_gust_state, set_turbulence
 from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, G_Q, gust_step
-from rtsim.atmosphere.spectra import longitudinal_spectrum, pitch_spectrum, vertical_spectrum
+from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.errors import InputError
 from rtsim.units import FOOT, KNOT, ft, kt
+
+
+def longitudinal_spectrum(frequency, *, sigma, scale, speed):
+    """MIL-F-8785C 3.7.1.2, one-sided in angular frequency [(m/s)^2 s/rad]: its integral from 0 is sigma squared."""
+    return sigma**2 * 2.0 * scale / (math.pi * speed) / (1.0 + (scale * frequency / speed) ** 2)
+
+
+def vertical_spectrum(frequency, *, sigma, scale, speed):
+    """MIL-F-8785C 3.7.1.2, one-sided in angular frequency [(m/s)^2 s/rad]: its integral from 0 is sigma squared."""
+    reduced = scale * frequency / speed
+    return sigma**2 * scale / (math.pi * speed) * (1.0 + 3.0 * reduced**2) / (1.0 + reduced**2) ** 2
+
+
+def pitch_spectrum(frequency, *, sigma, scale, speed, span):
+    """MIL-F-8785C 3.7.1.4: of the pitch gust that goes with the gust from below [(rad/s)^2 s/rad]."""
+    wave = frequency / speed
+    gain = wave**2 / (1.0 + (4.0 * span * wave / math.pi) ** 2)
+    return gain * vertical_spectrum(frequency, sigma=sigma, scale=scale, speed=speed)
+
 
 DT = 0.004
 SPAN = 32.17 * FOOT

@@ -7,17 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from rtsim.aircraft import INPUT, OUTPUT, OUTPUTS, STATE, STATES, Condition
+from rtsim.aircraft.points import Condition
 from rtsim.aircraft.profile import xv15_profile
+from rtsim.aircraft.variables import INPUT, OUTPUT, OUTPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError
-from rtsim.faults import Fault, FaultEvent, fault_events
 from rtsim.faults import fault_kernels as kernels
-from rtsim.faults.fault import engine_rating
+from rtsim.faults.fault import Fault, FaultEvent, engine_rating, fault_events
 from rtsim.faults.schedule import HARD_OVER_RATE, fault_tables, new_fault_state
-from rtsim.nacelle import load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, new_actuator_state
+from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.units import HORSEPOWER, deg, kt
 
 DT = 0.004

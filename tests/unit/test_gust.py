@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from rtsim.atmosphere import AirSpecification, Gust, Turbulence
 from rtsim.atmosphere import gust_kernels as kernels
 from rtsim.atmosphere.air import LIVE_SLOTS, add_gust, gust_tables, new_gust_state, normals_needed, set_turbulence
+from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
 from rtsim.errors import InputError
 from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, seed_sequence, stream_generator
 from rtsim.units import deg, kt

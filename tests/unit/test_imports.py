@@ -1,116 +1,66 @@
-"""Imports go one way: units, errors, frame, command at the bottom, the command line on top (docs/architecture.md)."""
+"""Imports go one way and in no circle: import-linter holds pyproject.toml's contracts, and would notice a breach."""
 
 from __future__ import annotations
 
-import ast
+import copy
 from pathlib import Path
 
+import grimp
 import pytest
+from importlinter.api import read_configuration
+from importlinter.contracts.acyclic_siblings import AcyclicSiblingsContract
+from importlinter.contracts.forbidden import ForbiddenContract
+from importlinter.contracts.layers import LayersContract
 
-ROOT = Path(__file__).resolve().parents[2]
-
-# A part may import from its own layer's parts only itself, and from every part of a lower layer.
-LAYERS = (
-    ("rtsim.units", "rtsim.places"),
-    ("rtsim.errors",),
-    ("rtsim.frame",),
-    ("rtsim.command",),
-    ("rtsim.choices",),
-    ("rtsim.random_streams", "rtsim.plugins"),
-    ("rtsim.kernels",),
-    ("rtsim.aircraft", "rtsim.programme", "telemetry"),
-    ("rtsim.corridor", "rtsim.atmosphere"),
-    ("rtsim.lpv",),
-    ("rtsim.nacelle",),
-    ("rtsim.pilot", "rtsim.aids", "rtsim.faults", "rtsim.protection", "rtsim.sticks"),
-    ("rtsim.systems",),
-    ("rtsim.loop",),
-    ("rtsim.measures", "rtsim.realtime"),
-    ("rtsim.optimization",),
-    ("rtsim.analysis",),
-    ("scenarios",),
-    ("rtsim.cli", "rtsim.__main__"),
-)
-LEVEL = {part: level for level, parts in enumerate(LAYERS) for part in parts}
-TELEMETRY_MAY_IMPORT = {"rtsim.units", "rtsim.errors", "rtsim.frame", "rtsim.command", "telemetry"}
-OUTPUT_PARTS = {"telemetry", "scenarios"}
+CONFIGURATION = read_configuration(str(Path(__file__).parents[2] / "pyproject.toml"))
+KINDS = {"layers": LayersContract, "forbidden": ForbiddenContract, "acyclic_siblings": AcyclicSiblingsContract}
+SESSION = CONFIGURATION["session_options"]
+CONTRACTS = {options["name"]: options for options in CONFIGURATION["contracts_options"]}
 
 
-def module_name(path):
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
+@pytest.fixture(scope="module")
 def modules():
-    files = [path for package in ("rtsim", "telemetry", "scenarios") for path in sorted((ROOT / package).rglob("*.py"))]
-    assert len(files) > 10
-    return files
+    """Every module of the project and what it imports, inside functions and for the type checker too."""
+    graph = grimp.build_graph(*SESSION["root_packages"], cache_dir=None)
+    assert len(graph.modules) > 250
+    return graph
 
 
-def part_of(name):
-    """The part of the architecture a module belongs to; None for what stands outside (other distributions)."""
-    pieces = name.split(".")
-    if pieces[0] in OUTPUT_PARTS:
-        return pieces[0]
-    if pieces[0] != "rtsim":
-        return None
-    return "rtsim" if len(pieces) == 1 else f"rtsim.{pieces[1]}"
+def held(name, graph):
+    options = CONTRACTS[name]
+    contract = KINDS[options["type"]](name, SESSION, options)
+    return contract.check(copy.deepcopy(graph), verbose=False)
 
 
-def imported_names(path):
-    """Every absolute module name a file imports, inside functions and type-checking blocks too."""
-    package = module_name(path).split(".")
-    if path.name != "__init__.py":
-        package = package[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            target = ".".join([*base, *([node.module] if node.module else [])])
-            # "from rtsim import units" imports the module rtsim.units.
-            yield from (f"{target}.{alias.name}" for alias in node.names) if target == "rtsim" else [target]
+@pytest.mark.parametrize("name", CONTRACTS)
+def test_contracts_hold(name, modules):
+    check = held(name, modules)
+    assert check.kept, f"run lint-imports to see where: {check.metadata}"
 
 
-def backward_arrows(path):
-    here = part_of(module_name(path))
-    if here == "rtsim":  # the package itself only hands out names, lazily
-        return []
-    faults = []
-    for name in imported_names(path):
-        there = part_of(name)
-        if there is None or here in {there, "rtsim.__main__"}:
-            continue
-        if there in {"rtsim", "rtsim.__version__"}:  # the version stands at the very bottom
-            continue
-        if here == "telemetry":
-            allowed = there in TELEMETRY_MAY_IMPORT
-        elif there in OUTPUT_PARTS and here.startswith("rtsim.") and here != "rtsim.cli":
-            allowed = False
-        else:
-            allowed = LEVEL[there] < LEVEL[here]
-        if not allowed:
-            faults.append(f"{module_name(path)} ({here}) imports {name} ({there})")
-    return faults
+@pytest.mark.parametrize(
+    ("start", "importer", "imported"),
+    [
+        ("A part of rtsim", "rtsim.corridor.boundaries", "rtsim.lpv.tables"),
+        ("A part of rtsim", "rtsim.pilot.design", "rtsim.aids.design"),
+        ("Flights are composed", "rtsim.loop.simulation", "telemetry.exchange.ring"),
+        ("Flights are composed", "rtsim.analysis.handling", "scenarios.flight.runner"),
+        ("Telemetry knows", "telemetry.log.reader", "rtsim.corridor.boundaries"),
+        ("Scenarios do not", "scenarios.flight.runner", "rtsim.cli.output"),
+        ("No circles", "rtsim.lpv.database", "rtsim.lpv.cells"),
+        ("No circles", "scenarios.files.loader", "scenarios.flight.runner"),
+        ("No circles", "telemetry.mavlink.services", "telemetry.mavlink.vehicle"),
+    ],
+)
+def test_a_breach_would_be_found(start, importer, imported, modules):
+    (name,) = [name for name in CONTRACTS if name.startswith(start)]
+    graph = copy.deepcopy(modules)
+    graph.add_import(importer=importer, imported=imported)
+    assert not held(name, graph).kept
 
 
-@pytest.mark.parametrize("path", modules(), ids=module_name)
-def test_no_import_goes_backward(path):
-    here = part_of(module_name(path))
-    assert here == "rtsim" or here in LEVEL, f"{here} has no place in the layers: add it to LAYERS"
-    assert backward_arrows(path) == []
-
-
-def test_a_backward_arrow_would_be_found(tmp_path, monkeypatch):
-    monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
-    wrong = tmp_path / "rtsim" / "corridor" / "wrong.py"
-    wrong.parent.mkdir(parents=True)
-    wrong.write_text(
-        "from rtsim import lpv\n\ndef f():\n    import telemetry.exchange.ring\n    from ..pilot import x\n"
-    )
-    faults = backward_arrows(wrong)
-    assert len(faults) == 3
-    sideways = tmp_path / "telemetry" / "wrong.py"
-    sideways.parent.mkdir()
-    sideways.write_text("from rtsim.corridor import load_corridor\nfrom rtsim.frame import SIGNALS\n")
-    assert len(backward_arrows(sideways)) == 1
+def test_a_part_without_a_place_would_be_found(modules):
+    (name,) = [name for name in CONTRACTS if name.startswith("A part of rtsim")]
+    graph = copy.deepcopy(modules)
+    graph.add_module("rtsim.utils")
+    assert not held(name, graph).kept

@@ -83,7 +83,7 @@ def test_kernels_are_compiled_into_the_folder(tmp_path):
     environment.pop("NUMBA_CACHE_DIR", None)
     code = (
         "import numpy as np\n"
-        "from rtsim.corridor import load_corridor\n"
+        "from rtsim.corridor.boundaries import load_corridor\n"
         "from rtsim.corridor.corridor_kernels import corridor_margins\n"
         "corridor_margins(load_corridor('design').tables(), 50.0, 1.0, np.zeros(4))\n"
     )

@@ -14,9 +14,11 @@ import pytest
 
 from rtsim.command import Command, Intervention, Margins, Sensors
 from rtsim.errors import InputError
-from rtsim.protection import LawChain, guard, load_laws
 from rtsim.protection import chain as module
+from rtsim.protection import guard
+from rtsim.protection.chain import LawChain
 from rtsim.protection.guard import CallLimit, guarded_call
+from rtsim.protection.laws import load_laws
 from rtsim.protection.limits import LIMIT_KINDS
 from rtsim.units import INCH_POUND, deg, kt
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from rtsim.command import SENSOR
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection import LAW_NAMES, law_tables
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels as kernels
+from rtsim.protection.tables import LAW_NAMES, law_tables
 from rtsim.units import INCH_POUND, deg, kt
 
 DT = 0.004

@@ -15,13 +15,12 @@ import pytest
 
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.command import SENSOR, Command, Sensors
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from rtsim.protection import MarginMonitor
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limits
-from rtsim.protection.monitor import MarginHistory, MarginWatch, sensor_array, sensors_of_rows
+from rtsim.protection.monitor import MarginHistory, MarginMonitor, MarginWatch, sensor_array, sensors_of_rows
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 ROOT = Path(__file__).resolve().parents[2]

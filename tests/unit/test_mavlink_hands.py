@@ -9,13 +9,14 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from rtsim.aids import AIDS, SWITCHES
+from rtsim.aids.design import AIDS, SWITCHES
 from rtsim.choices import AidName
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
 from rtsim.loop.simulation import Simulation
-from rtsim.realtime import Executive, FlightControl
+from rtsim.realtime.control import FlightControl
+from rtsim.realtime.executive import Executive
 from rtsim.units import to_deg
 from scenarios.files.loader import load_scenario
 from scenarios.files.options import Overrides, with_overrides
@@ -24,7 +25,7 @@ from scenarios.flight.hands import Hands
 from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config
 from scenarios.flight.session import FlightSession
 from scenarios.flight.sinks import FlightSinks
-from telemetry.mavlink import Request
+from telemetry.mavlink.exchange import Request
 from telemetry.mavlink.parameters import AID_PARAMETERS
 
 FLYING = StickInput(sequence=1, received_ns=1, stick_valid=True, lever_valid=True, lever=0.3)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rtsim.errors import InputError
-from rtsim.pilot import MocmError, build_problem, design_mocm, design_problem
-from rtsim.pilot.problem import REFUSAL_CODES
+from rtsim.pilot.design import design_mocm, design_problem
+from rtsim.pilot.problem import REFUSAL_CODES, MocmError, build_problem
 
 BASE: dict[str, Any] = {
     "A": [[-2.0, 0, 0], [1, 0, 0], [0, 1, 0]], "B": [[0], [1.0], [0]], "C": [[0, 0, 1.0], [0, 1, 0]],

@@ -7,7 +7,6 @@ import pytest
 from scipy import signal
 
 from rtsim.errors import InputError
-from rtsim.nacelle import NacelleActuator, NacelleSwitch, load_nacelle_tables
 from rtsim.nacelle.nacelle_kernels import (
     nacelle_advance,
     nacelle_assigned_rate,
@@ -16,6 +15,7 @@ from rtsim.nacelle.nacelle_kernels import (
     new_actuator_state,
     on_downstop,
 )
+from rtsim.nacelle.switch import NacelleActuator, NacelleSwitch, load_nacelle_tables
 from rtsim.units import deg, to_deg
 
 DT = 0.004

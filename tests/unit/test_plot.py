@@ -11,16 +11,17 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.log import flight_plots
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.log.flight_plots import plot_flight
 from telemetry.log.format import FlightMetadata
 from telemetry.log.reader import FlightLog, read_log
 from telemetry.log.recorder import Recorder
-from telemetry.view.corridor_outline import CorridorOutline
-from telemetry.view.signal_groups import label
+from telemetry.log.signal_groups import label
 
 OUTLINE = CorridorOutline.from_lines("design", low=([90.0, 0.0], [0.0, 101.0]), high=([90.0, 0.0], [125.0, 170.0]))
 

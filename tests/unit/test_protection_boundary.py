@@ -5,14 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtsim.aircraft import OUTPUT, STATE, Condition
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.choices import CORRIDOR_NAMES
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.files.storage import load_database
-from rtsim.protection import check_consistency, load_boundary
-from rtsim.protection.boundary import MODEL_PITCH, guarded_corridor, model_corridor, trim_range
+from rtsim.protection.boundary import (
+    MODEL_PITCH,
+    check_consistency,
+    guarded_corridor,
+    load_boundary,
+    model_corridor,
+    trim_range,
+)
 from rtsim.protection.limits import load_limits
 from rtsim.units import deg, kt, to_deg, to_kt
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import solve_continuous_are
 from scipy.signal import cont2discrete
 
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.files.storage import load_database

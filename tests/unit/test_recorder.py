@@ -24,10 +24,10 @@ from rtsim.frame import SIGNAL_COUNT, SIGNALS, history_sha256
 from telemetry.exchange.child_process import child_environment
 from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT
 from telemetry.log import recorder_worker
+from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.log.format import HEADER_PART, LOG_NAMES, FlightMetadata, LogEvent
 from telemetry.log.reader import read_log
 from telemetry.log.recorder import Recorder
-from telemetry.view.corridor_outline import CorridorOutline
 
 OUTLINE = CorridorOutline.from_lines("design", low=([90.0, 0.0], [0.0, 101.0]), high=([90.0, 0.0], [125.0, 170.0]))
 METADATA = FlightMetadata(

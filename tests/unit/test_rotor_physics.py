@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
-from rtsim.aircraft import STATE, Condition
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import STATE
 from rtsim.aircraft.xv15 import rotor_kernels as kernels
 from rtsim.aircraft.xv15.data_reader import read_data
 from rtsim.aircraft.xv15.model import Xv15

@@ -9,9 +9,9 @@ import pytest
 from rtsim.cli.check import file_problems
 from rtsim.errors import InputError
 from rtsim.units import kt, to_deg, to_kt
+from scenarios.files.expectation import Expectation
 from scenarios.files.loader import library_names, load_scenario, parse_scenario, scenario_problems
 from scenarios.files.options import Overrides, with_overrides
-from scenarios.files.scenario import Expectation
 from scenarios.flight.preflight import preflight_problems
 
 GOOD = """

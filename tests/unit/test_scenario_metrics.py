@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rtsim.frame import COLUMN, SIGNAL_COUNT, FloatArray
+from rtsim.arrays import FloatArray
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.measures.metric_kernels import METRICS, VALUE, nacelle_reference
 from rtsim.measures.metrics import (
     METRIC_NAMES,

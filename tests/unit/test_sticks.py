@@ -10,19 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtsim.command import Command, StickInput
-from rtsim.corridor import load_corridor
+from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
-from rtsim.sticks import (
-    INPUT_LIVE,
-    INPUT_LOST,
-    INPUT_NONE,
-    StickHandler,
-    StickSettings,
-    StickSituation,
-    transition_schedule,
-)
-from rtsim.sticks.settings import shaped
-from rtsim.sticks.transition import TO_AIRPLANE, TO_HELICOPTER
+from rtsim.sticks.handler import INPUT_LIVE, INPUT_LOST, INPUT_NONE, StickHandler, StickSituation
+from rtsim.sticks.settings import StickSettings, shaped
+from rtsim.sticks.transition import TO_AIRPLANE, TO_HELICOPTER, transition_schedule
 from rtsim.units import deg, kt, to_deg
 
 DT = 0.004

@@ -7,11 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtsim.aircraft import INPUT, INPUTS
-from rtsim.aircraft.variables import FLAP_INPUTS
+from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS
 from rtsim.systems import drive_kernels as drive
 from rtsim.systems import flap_kernels as flap
-from rtsim.systems import load_drive_tables, load_flap_tables
+from rtsim.systems.settings import load_drive_tables, load_flap_tables
 from rtsim.units import HORSEPOWER, deg, rpm
 
 FLAPS, DRIVE = load_flap_tables(), load_drive_tables()

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtsim.aircraft import OUTPUT, STATE, STATES, Condition
+from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import OUTPUT, STATE, STATES
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.units import GRAVITY, POUND, deg, kt, rpm, to_deg
 

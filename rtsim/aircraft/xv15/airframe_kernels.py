@@ -1,4 +1,8 @@
-"""Wing, fuselage, pylons and fins: forces [N] along body x and z, pitching moment [N m] about the centre of gravity."""
+"""Wing, fuselage, pylons and fins: forces [N] along body x and z, pitching moment [N m] about the centre of gravity.
+
+Legend:
+    wing: The tables.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +65,6 @@ def wing_coefficients(
     """Lift and drag coefficient of the wing, linear in flap and in mast angle between the tables.
 
     Args:
-        wing: The tables.
         alpha: Angle of attack, wing-flap-slipstream corrected [rad].
         mast_fraction: 0 helicopter, 1 airplane.
         flap: Flap deflection [rad].
@@ -97,9 +100,7 @@ def wing_angle_of_attack(
     """Fuselage angle of attack less the rotors' induced change at the wing (alpha_WFS of NASA CR-166536).
 
     Args:
-        wing: The tables.
         alpha: Fuselage angle of attack [rad].
-        nacelle: Nacelle angle [rad].
         advance_ratio: Airspeed over tip speed.
         rotor_force_coefficient: Force of both rotors over density, pi, tip speed squared, radius squared.
     """
@@ -110,12 +111,7 @@ def wing_angle_of_attack(
 
 @inner_kernel
 def immersed_share(wing: WingTables, airspeed: float) -> float:
-    """How much of the hover download is left at this airspeed, 1 to 0.
-
-    Args:
-        wing: The tables.
-        airspeed: Airspeed [m/s].
-    """
+    """How much of the hover download is left at this airspeed, 1 to 0."""
     ratio = min(abs(airspeed) / wing.immersed_fade_speed, 1.0)
     return (1.0 - ratio * ratio) ** 2
 
@@ -132,7 +128,6 @@ def wing_load(
     """Free-stream wing load plus the download of the part in the rotor wake.
 
     Args:
-        wing: The tables.
         air: Density and speed of sound.
         flow: u, w and pitch rate [m/s, rad/s].
         setting: Nacelle angle [rad], flap [rad], wing angle of attack [rad].
@@ -184,7 +179,6 @@ def body_load(
         body: The tables.
         air: Density.
         flow: u, w [m/s].
-        nacelle: Nacelle angle [rad].
         induced: Mean induced velocity of the rotors [m/s].
         arms: Arms of the fuselage reference point, the nacelle pivot and the fins [m].
     """

@@ -6,16 +6,15 @@ leaves here is SI and uses the nacelle angle (90 helicopter, 0 airplane).
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from rtsim.aircraft.atmosphere import standard_atmosphere
+from rtsim.aircraft.profile import XV15_DATA
 from rtsim.aircraft.smooth_tables import smooth_curves, smooth_surface, stack_surfaces
-from rtsim.aircraft.table_kernels import Curves, FloatArray
+from rtsim.aircraft.table_kernels import Curves
 from rtsim.aircraft.xv15.rotor_reader import read_rotor
 from rtsim.aircraft.xv15.tables import (
     AircraftTables,
@@ -26,6 +25,8 @@ from rtsim.aircraft.xv15.tables import (
     TailTables,
     WingTables,
 )
+from rtsim.arrays import FloatArray
+from rtsim.toml_file import shipped_toml
 from rtsim.units import FOOT, INCH, KNOT, POUND, SLUG, SLUG_FOOT_SQUARED, deg, rpm
 
 Data = dict[str, Any]
@@ -36,11 +37,7 @@ NACELLE_GRID = np.radians(np.arange(0.0, 96.0, 1.0))
 
 def read_data() -> tuple[Data, Data]:
     """The sourced inputs and our choices, as printed."""
-    folder = files("rtsim.aircraft.xv15") / "data"
-    return (
-        tomllib.loads((folder / "xv15_inputs.toml").read_text()),
-        tomllib.loads((folder / "model_choices.toml").read_text()),
-    )
+    return shipped_toml(XV15_DATA, "xv15_inputs.toml"), shipped_toml(XV15_DATA, "model_choices.toml")
 
 
 def _against_nacelle(mast_deg: Sequence[float], rows: Sequence[Sequence[float]]) -> Curves:

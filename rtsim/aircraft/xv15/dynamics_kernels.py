@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
 from rtsim.aircraft.xv15.airframe_kernels import body_load, moment_arm, wing_angle_of_attack, wing_load
 from rtsim.aircraft.xv15.rotor_kernels import (
@@ -19,6 +19,7 @@ from rtsim.aircraft.xv15.rotor_kernels import (
 )
 from rtsim.aircraft.xv15.tables import AircraftTables, Configuration, ControlTables, MassTables
 from rtsim.aircraft.xv15.tail_kernels import tail_load
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.units import GRAVITY
 
@@ -39,8 +40,6 @@ def flap_schedule(controls: ControlTables, airspeed: float, nacelle: float) -> f
 
     Args:
         controls: The schedule.
-        airspeed: Airspeed [m/s].
-        nacelle: Nacelle angle [rad].
     """
     start, end = controls.flap_retraction[0], controls.flap_retraction[1]
     retracted = min(max((airspeed - start) / (end - start), 0.0), 1.0)
@@ -55,7 +54,6 @@ def flap_deflection(scheduled: float, nodes: FloatArray, u: FloatArray) -> float
     Args:
         scheduled: Deflection of the configuration or of the schedule [rad].
         nodes: Published settings, ascending [rad].
-        u: Inputs.
     """
     flap = scheduled + (u[INPUT.flap_0_20] + u[INPUT.flap_20_40] + u[INPUT.flap_40_75])
     return min(max(flap, nodes[0]), nodes[nodes.shape[0] - 1])
@@ -67,7 +65,6 @@ def gravity_centre(mass: MassTables, nacelle: float) -> tuple[float, float]:
 
     Args:
         mass: The law's constants.
-        nacelle: Nacelle angle [rad].
     """
     s, c = math.cos(nacelle), math.sin(nacelle)
     x, z = mass.gravity_shift[0], mass.gravity_shift[1]
@@ -87,7 +84,6 @@ def commanded_controls(
         controls: Gearing and limits.
         stick: Stick, -1 to 1 forward.
         lever: Lever, 0 to 1.
-        nacelle: Nacelle angle [rad].
     """
     low = curve(controls.collective_range, 0, nacelle)
     high = curve(controls.collective_range, 1, nacelle)
@@ -105,10 +101,8 @@ def derivative(
     """State derivative of the nonlinear model.
 
     Args:
-        tables: The aircraft.
         x: State, order of ``signals.STATES``.
         u: Inputs, order of ``signals.INPUTS``.
-        nacelle: Nacelle angle [rad].
         xdot: Written: state derivative.
         work: Scratch of WORK_COUNT numbers; afterwards holds rotor loads and component loads.
     """
@@ -236,10 +230,6 @@ def outputs(
     """Outputs, order of ``signals.OUTPUTS``.
 
     Args:
-        tables: The aircraft.
-        x: State.
-        u: Inputs.
-        nacelle: Nacelle angle [rad].
         y: Written: outputs.
         xdot: Written: state derivative.
         work: Scratch of WORK_COUNT numbers.
@@ -267,11 +257,9 @@ def step(
     """Advance the state by one fixed Runge-Kutta 4 step, in place.
 
     Args:
-        tables: The aircraft.
         x: State, overwritten.
         u: Inputs; nacelle rate and acceleration are taken from the path.
         nacelle_path: Nacelle angle, rate, acceleration at start, middle and end of the step, shape (3, 3).
-        dt: Length of the step [s].
         work: Scratch of WORK_COUNT + 6 * states numbers.
     """
     n = x.shape[0]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, OUTPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
+from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 
 # Large enough to average over table curvature, small enough for second-order accuracy (docs/model.md).
 STATE_STEPS = {
@@ -24,9 +23,6 @@ STATE_STEPS = {
 }
 """Steps of the states, by role and unit."""
 ELEVATOR_STEP = 1e-3
-
-if TYPE_CHECKING:
-    from rtsim.aircraft.xv15.model import Xv15
 INPUT_STEPS = {
     "stick": 1e-3,
     "lever": 1e-3,
@@ -41,18 +37,18 @@ INPUT_STEPS = {
 NACELLE_STEP = 1e-4
 
 
-def _evaluate(aircraft: Xv15, x: FloatArray, u: FloatArray, nacelle: float) -> FloatArray:
+def _evaluate(tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle: float) -> FloatArray:
     xdot, y = np.zeros(x.size), np.zeros(len(OUTPUTS))
-    kernels.outputs(aircraft.tables, x, u, nacelle, y, xdot, np.zeros(kernels.WORK_COUNT))
+    kernels.outputs(tables, x, u, nacelle, y, xdot, np.zeros(kernels.WORK_COUNT))
     return np.concatenate([xdot, y])
 
 
-def _flap_column(aircraft: Xv15, trim: TrimPoint, condition: Condition, interval: int) -> FloatArray:
+def _flap_column(tables: AircraftTables, trim: TrimPoint, condition: Condition, interval: int) -> FloatArray:
     """Effect of the flaps in one interval between published settings, wherever in the travel the trim has them.
 
     A small step at the trim would mix two intervals: the schedule stands at the corner between them.
     """
-    tables, nacelle, u = aircraft.tables, condition.nacelle_angle, trim.u.copy()
+    nacelle, u = condition.nacelle_angle, trim.u.copy()
     present = tables.configuration.flap
     if present < 0.0:
         speed = float(np.hypot(trim.x[STATE.u] + u[INPUT.gust_u], trim.x[STATE.w] + u[INPUT.gust_w]))
@@ -62,17 +58,16 @@ def _flap_column(aircraft: Xv15, trim: TrimPoint, condition: Condition, interval
     ends = []
     for node in tables.wing.flap_nodes[interval : interval + 2]:
         u[INPUT.flap_0_20] = node - present
-        ends.append(_evaluate(aircraft, trim.x, u, nacelle))
+        ends.append(_evaluate(tables, trim.x, u, nacelle))
     low, high = tables.wing.flap_nodes[interval : interval + 2]
     return np.asarray((ends[1] - ends[0]) / (high - low))
 
 
-def linearize_at(aircraft: Xv15, condition: Condition, trim: TrimPoint, *, step_scale: float) -> LinearModel:
+def linearize_at(tables: AircraftTables, condition: Condition, trim: TrimPoint, *, step_scale: float) -> LinearModel:
     """Jacobians at a trim point.
 
     Args:
-        aircraft: The aircraft, already at the condition.
-        condition: The flight condition.
+        tables: The aircraft, already at the condition.
         trim: The trim point.
         step_scale: Multiplies every step.
     """
@@ -83,19 +78,19 @@ def linearize_at(aircraft: Xv15, condition: Condition, trim: TrimPoint, *, step_
         size *= step_scale
         shift = np.zeros(x.size)
         shift[i] = size
-        above, below = _evaluate(aircraft, x + shift, u, nacelle), _evaluate(aircraft, x - shift, u, nacelle)
+        above, below = _evaluate(tables, x + shift, u, nacelle), _evaluate(tables, x - shift, u, nacelle)
         columns.append((above - below) / (2 * size))
     for i, variable in enumerate(INPUTS):
         if variable.name in FLAP_INPUTS:
-            columns.append(_flap_column(aircraft, trim, condition, FLAP_INPUTS.index(variable.name)))
+            columns.append(_flap_column(tables, trim, condition, FLAP_INPUTS.index(variable.name)))
             continue
         size = INPUT_STEPS[variable.name] * step_scale
         shift = np.zeros(u.size)
         shift[i] = size
-        above, below = _evaluate(aircraft, x, u + shift, nacelle), _evaluate(aircraft, x, u - shift, nacelle)
+        above, below = _evaluate(tables, x, u + shift, nacelle), _evaluate(tables, x, u - shift, nacelle)
         columns.append((above - below) / (2 * size))
     step = NACELLE_STEP * step_scale
-    by_nacelle = (_evaluate(aircraft, x, u, nacelle + step) - _evaluate(aircraft, x, u, nacelle - step)) / (2 * step)
+    by_nacelle = (_evaluate(tables, x, u, nacelle + step) - _evaluate(tables, x, u, nacelle - step)) / (2 * step)
     jacobian = np.array(columns).T
     n = x.size
     return LinearModel(

@@ -10,10 +10,10 @@ import numpy as np
 
 from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import OUTPUTS, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import packed
 
@@ -32,11 +32,7 @@ class Xv15:
         return Xv15(_cached_tables())
 
     def at(self, condition: Condition) -> Xv15:
-        """The same aircraft with the condition's mass, air, rotor speed and flap.
-
-        Args:
-            condition: The flight condition.
-        """
+        """The same aircraft with the condition's mass, air, rotor speed and flap."""
         density, sound_speed = standard_atmosphere(condition.pressure_altitude)
         base = self.tables.configuration
         configuration = base._replace(
@@ -54,32 +50,19 @@ class Xv15:
         Args:
             x: State, shape (17,), order of ``signals.STATES``.
             u: Inputs, shape (11,), order of ``signals.INPUTS``.
-            nacelle_angle: Nacelle angle [rad].
         """
         xdot = np.zeros(len(STATES))
         kernels.derivative(self.tables, x, u, nacelle_angle, xdot, self._work)
         return xdot
 
     def outputs(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
-        """Outputs, order of ``signals.OUTPUTS``.
-
-        Args:
-            x: State.
-            u: Inputs.
-            nacelle_angle: Nacelle angle [rad].
-        """
+        """Outputs, order of ``signals.OUTPUTS``."""
         y, xdot = np.zeros(len(OUTPUTS)), np.zeros(len(STATES))
         kernels.outputs(self.tables, x, u, nacelle_angle, y, xdot, self._work)
         return y
 
     def component_loads(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> dict[str, FloatArray]:
-        """Force along body x and z [N] and moment about the centre of gravity [N m] of each component.
-
-        Args:
-            x: State.
-            u: Inputs.
-            nacelle_angle: Nacelle angle [rad].
-        """
+        """Force along body x and z [N] and moment about the centre of gravity [N m] of each component."""
         self.derivative(x, u, nacelle_angle)
         start = kernels.COMPONENT
         return {
@@ -91,24 +74,22 @@ class Xv15:
         """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.
 
         Args:
-            condition: The flight condition.
             guess: A neighbouring trim to start from (continuation); None: the unstalled trim is searched for.
         """
         from rtsim.aircraft.xv15.trim import solve_trim
 
-        return solve_trim(self.at(condition), condition, guess)
+        return solve_trim(self.at(condition).tables, condition, guess)
 
     def linearize(self, condition: Condition, trim: TrimPoint, *, step_scale: float = 1.0) -> LinearModel:
         """Jacobians at a trim point by central differences.
 
         Args:
-            condition: The flight condition.
             trim: The trim found there.
             step_scale: Multiplies every step; a second value checks the Jacobians.
         """
         from rtsim.aircraft.xv15.linearize import linearize_at
 
-        return linearize_at(self.at(condition), condition, trim, step_scale=step_scale)
+        return linearize_at(self.at(condition).tables, condition, trim, step_scale=step_scale)
 
 
 @cache

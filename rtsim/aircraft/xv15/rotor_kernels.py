@@ -11,6 +11,15 @@ Legend of the short names:
     ut, up         section velocity in the disc plane and down through it [m/s]
 Sources: Johnson, Helicopter Theory (1980), ch. 5 (flapping, sign of each term); Pitt and Peters 1981 (inflow);
 White and Blake 1979 (fore-aft gradient); gearing and data NASA CR-166536.
+
+Legend:
+    rotor: The rotor.
+    air: Density, speed of sound, rotor speed.
+    hub: vf, vt, p.
+    flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
+    inflow: l0, l1c, l1s.
+    pitch: Collective at 75 % radius, longitudinal cyclic [rad].
+    loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
 """
 
 from __future__ import annotations
@@ -19,8 +28,9 @@ import math
 
 import numpy as np
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.xv15.tables import Configuration, RotorTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 
 # Entries of the load vector written by rotor_loads.
@@ -65,7 +75,6 @@ def _section_flow(
     """Write angle of attack, speed, ut and up at every station.
 
     Args:
-        rotor: The rotor.
         tangential: ut at the hub and its growth with radius.
         axial: up at the hub and its growth with radius.
         root_pitch: Blade pitch without twist [rad].
@@ -92,7 +101,6 @@ def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
     Lift and drag share one grid over the whole circle: one cell and one Hermite basis serve both.
 
     Args:
-        rotor: The rotor.
         flow: Row ALPHA is read; written: rows LIFT, DRAG.
     """
     data = rotor.section
@@ -118,7 +126,6 @@ def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) ->
     Prandtl-Glauert from the data's Mach number; Lock's drag rise relative to the data's Mach number.
 
     Args:
-        rotor: The rotor.
         air: Density and speed of sound.
         flow: Rows as left by ``_section_tables``; written: LIFT becomes the normal, DRAG the in-plane force.
     """
@@ -153,17 +160,7 @@ def rotor_loads(
     pitch: tuple[float, float],
     loads: FloatArray,
 ) -> None:
-    """Integrate the section loads over the disc.
-
-    Args:
-        rotor: The rotor.
-        air: Density, speed of sound, rotor speed.
-        hub: vf, vt, p.
-        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
-        inflow: l0, l1c, l1s.
-        pitch: Collective at 75 % radius, longitudinal cyclic [rad].
-        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
-    """
+    """Integrate the section loads over the disc."""
     flow = np.empty((FLOW_COUNT, rotor.stations.shape[0]))
     rotor_loads_in(rotor, air, hub, flapping, inflow, pitch, loads, flow)
 
@@ -182,13 +179,6 @@ def rotor_loads_in(
     """`rotor_loads` in given work space.
 
     Args:
-        rotor: The rotor.
-        air: Density, speed of sound, rotor speed.
-        hub: vf, vt, p.
-        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
-        inflow: l0, l1c, l1s.
-        pitch: Collective at 75 % radius, longitudinal cyclic [rad].
-        loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
         flow: Scratch, shape (FLOW_COUNT, stations).
     """
     vf, vt, p = hub
@@ -246,10 +236,8 @@ def flapping_accelerations(
     The mast pitching at rate p leaves the disc behind: + p_dot in the cosine and -2 om p in the sine equation.
 
     Args:
-        rotor: The rotor.
         om: Rotor speed [rad/s].
         mast: Pitch rate of the mast, nacelle motion included [rad/s], and its rate [rad/s^2].
-        flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
         loads: From ``rotor_loads``.
     """
     b0, _, b1c, b1cd, b1s, b1sd = flapping
@@ -275,10 +263,7 @@ def inflow_rates(
     """Rates of the three inflow states [1/s].
 
     Args:
-        rotor: The rotor.
         air: Density and rotor speed.
-        hub: vf, vt, p.
-        inflow: l0, l1c, l1s.
         loads: From ``rotor_loads``.
     """
     l0, l1c, l1s = inflow

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rtsim.aircraft.smooth_tables import smooth_curves
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.xv15.tables import RotorTables
+from rtsim.arrays import FloatArray
 from rtsim.units import FOOT, SLUG_FOOT_SQUARED, deg
 
 SEA_LEVEL_SOUND_SPEED = 340.294

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.aircraft.table_kernels import Curves, FloatArray, Surfaces
+from rtsim.aircraft.table_kernels import Curves, Surfaces
+from rtsim.arrays import FloatArray
 
 
 class Configuration(NamedTuple):

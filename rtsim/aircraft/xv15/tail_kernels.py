@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aircraft.table_kernels import FloatArray, curve, surface
+from rtsim.aircraft.table_kernels import curve, surface
 from rtsim.aircraft.xv15.airframe_kernels import fold, wind_to_body
 from rtsim.aircraft.xv15.tables import Configuration, TailTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 
@@ -27,7 +28,6 @@ def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) 
     Args:
         tail: The tables.
         alpha: Fuselage angle of attack [rad].
-        nacelle: Nacelle angle [rad].
         flap: Flap deflection [rad].
     """
     k, part = _bracket(tail.downwash_nacelle, nacelle)

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rtsim.aircraft.points import Condition, TrimPoint
-from rtsim.aircraft.table_kernels import FloatArray
 from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
+from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.aircraft.xv15.trim_kernels import (
     RESIDUAL_ROWS,
     UNKNOWNS,
@@ -25,10 +24,8 @@ from rtsim.aircraft.xv15.trim_kernels import (
     trim_residual,
     trim_vectors,
 )
+from rtsim.arrays import FloatArray
 from rtsim.units import GRAVITY, KNOT
-
-if TYPE_CHECKING:
-    from rtsim.aircraft.xv15.model import Xv15
 
 CONVERGED = 1e-9
 """Largest scaled residual of a converged trim."""
@@ -53,8 +50,8 @@ def _flight(condition: Condition) -> Flight:
     return float(condition.airspeed), float(condition.acceleration), float(condition.nacelle_angle)
 
 
-def _newton(aircraft: Xv15, condition: Condition, z: FloatArray, iterations: int) -> FloatArray:
-    tables, flight = aircraft.tables, _flight(condition)
+def _newton(tables: AircraftTables, condition: Condition, z: FloatArray, iterations: int) -> FloatArray:
+    flight = _flight(condition)
     residual, trial, jacobian = np.empty(UNKNOWNS), np.empty(UNKNOWNS), np.empty((UNKNOWNS, UNKNOWNS))
     trim_residual(tables, flight, z, residual)
     norms = [float(np.linalg.norm(residual))]
@@ -83,9 +80,9 @@ def _newton(aircraft: Xv15, condition: Condition, z: FloatArray, iterations: int
     return z
 
 
-def _first_guess(aircraft: Xv15, condition: Condition) -> FloatArray:
+def _first_guess(tables: AircraftTables, condition: Condition) -> FloatArray:
     """Values near which the helicopter or the airplane trims; Newton does the rest."""
-    air, rotor = aircraft.tables.configuration, aircraft.tables.rotor
+    air, rotor = tables.configuration, tables.rotor
     tip = air.rotor_speed * rotor.radius
     axial = condition.airspeed * math.cos(condition.nacelle_angle)
     disc = air.density * math.pi * rotor.radius**2
@@ -110,13 +107,13 @@ def _unknowns(point: TrimPoint) -> FloatArray:
     return np.array([x[STATE.pitch], point.u[INPUT.stick], *(x[i] for i in states)])
 
 
-def _point(aircraft: Xv15, condition: Condition, z: FloatArray) -> TrimPoint:
+def _point(tables: AircraftTables, condition: Condition, z: FloatArray) -> TrimPoint:
     """Trim point of a set of unknowns, saying which residual did not close."""
     x, u, residuals = np.empty(len(STATES)), np.empty(len(INPUTS)), np.empty(UNKNOWNS)
-    trim_vectors(aircraft.tables, _flight(condition), z, x, u)
+    trim_vectors(tables, _flight(condition), z, x, u)
     xdot, y, work = np.zeros(len(STATES)), np.zeros(len(OUTPUTS)), np.zeros(kernels.WORK_COUNT)
-    kernels.outputs(aircraft.tables, x, u, condition.nacelle_angle, y, xdot, work)
-    trim_residual(aircraft.tables, _flight(condition), z, residuals)
+    kernels.outputs(tables, x, u, condition.nacelle_angle, y, xdot, work)
+    trim_residual(tables, _flight(condition), z, residuals)
     sizes = np.where(np.isfinite(residuals), np.abs(residuals), np.inf)
     worst = int(np.argmax(sizes))
     residual = float(sizes[worst])
@@ -129,37 +126,37 @@ def _point(aircraft: Xv15, condition: Condition, z: FloatArray) -> TrimPoint:
     return TrimPoint(x=x, u=u, y=y, xdot=xdot, converged=unclosed == "", residual=residual, unclosed=unclosed)
 
 
-def _solve(aircraft: Xv15, condition: Condition, z: FloatArray, iterations: int = 40) -> TrimPoint:
-    return _point(aircraft, condition, _newton(aircraft, condition, z, iterations))
+def _solve(tables: AircraftTables, condition: Condition, z: FloatArray, iterations: int = 40) -> TrimPoint:
+    return _point(tables, condition, _newton(tables, condition, z, iterations))
 
 
 def _near_stall(point: TrimPoint, airspeed: float) -> bool:
     return airspeed > WING_BORNE_AIRSPEED and bool(point.y[OUTPUT.wing_angle_of_attack] > STALL_WATCH)
 
 
-def _anchor(aircraft: Xv15, condition: Condition) -> tuple[TrimPoint, float] | None:
+def _anchor(tables: AircraftTables, condition: Condition) -> tuple[TrimPoint, float] | None:
     """An unstalled trim at the same nacelle angle, from where the continuation starts, and its airspeed, or None."""
-    air = aircraft.tables.configuration
+    air = tables.configuration
     # At the same lift coefficient the airspeed grows with the root of weight over density.
     scale = math.sqrt(air.mass / 5896.7 * 1.225 / air.density) * KNOT
     angle = math.degrees(condition.nacelle_angle)
     airspeeds = next(speeds for lowest, speeds in _ANCHORS if angle >= lowest)
     for airspeed in airspeeds:
         easy = replace(condition, airspeed=airspeed * scale)
-        point = _solve(aircraft, easy, _first_guess(aircraft, easy))
+        point = _solve(tables, easy, _first_guess(tables, easy))
         if point.converged and not _near_stall(point, easy.airspeed):
             return point, easy.airspeed
     return None
 
 
-def _continue_to(aircraft: Xv15, condition: Condition, start: TrimPoint, airspeed: float) -> TrimPoint:
+def _continue_to(tables: AircraftTables, condition: Condition, start: TrimPoint, airspeed: float) -> TrimPoint:
     """Walk in airspeed from a trim to the wanted one, shortening the step wherever the branch is lost."""
     point, step = start, _LONGEST_STEP
     for _ in range(_MOST_STEPS):
         left = condition.airspeed - airspeed
         last = abs(left) <= step
         goal = condition if last else replace(condition, airspeed=airspeed + math.copysign(step, left))
-        trial = _solve(aircraft, goal, _unknowns(point), iterations=12)
+        trial = _solve(tables, goal, _unknowns(point), iterations=12)
         turn = abs(trial.x[STATE.pitch] - point.x[STATE.pitch])
         if trial.converged and not (_near_stall(trial, goal.airspeed) and turn > _LARGEST_PITCH_CHANGE):
             if last:
@@ -170,7 +167,7 @@ def _continue_to(aircraft: Xv15, condition: Condition, start: TrimPoint, airspee
             if step < _SHORTEST_STEP:
                 break
     # The branch ends before the wanted airspeed: report what does not close there.
-    return _lost(_point(aircraft, condition, _unknowns(point)))
+    return _lost(_point(tables, condition, _unknowns(point)))
 
 
 def _lost(point: TrimPoint) -> TrimPoint:
@@ -178,23 +175,22 @@ def _lost(point: TrimPoint) -> TrimPoint:
     return replace(point, converged=False, unclosed=point.unclosed or STATES[STATE.w].name)
 
 
-def solve_trim(aircraft: Xv15, condition: Condition, guess: TrimPoint | None) -> TrimPoint:
+def solve_trim(tables: AircraftTables, condition: Condition, guess: TrimPoint | None) -> TrimPoint:
     """Trim at a condition.
 
     Args:
-        aircraft: The aircraft, already at the condition.
-        condition: The flight condition.
+        tables: The aircraft, already at the condition.
         guess: A neighbouring trim, or None to search for the unstalled trim.
 
     Returns:
         The trim; where none was found ``converged`` is False and ``unclosed`` names the residual left over.
     """
     if guess is not None:
-        return _solve(aircraft, condition, _unknowns(guess))
-    direct = _solve(aircraft, condition, _first_guess(aircraft, condition))
+        return _solve(tables, condition, _unknowns(guess))
+    direct = _solve(tables, condition, _first_guess(tables, condition))
     if direct.converged and not _near_stall(direct, condition.airspeed):
         return direct
-    start = _anchor(aircraft, condition)
+    start = _anchor(tables, condition)
     if start is None:
         return _lost(direct)
-    return _continue_to(aircraft, condition, *start)
+    return _continue_to(tables, condition, *start)

@@ -11,10 +11,11 @@ import math
 
 import numpy as np
 
-from rtsim.aircraft.table_kernels import FloatArray, curve
+from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import INPUT, INPUTS, STATE, STATES
 from rtsim.aircraft.xv15.dynamics_kernels import WORK_COUNT, derivative
 from rtsim.aircraft.xv15.tables import AircraftTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import kernel
 
 UNKNOWNS = 9
@@ -44,7 +45,6 @@ def trim_vectors(tables: AircraftTables, flight: Flight, z: FloatArray, x: Float
     """State and inputs of a set of unknowns; the actuators stand where stick and lever ask them to, stops ignored.
 
     Args:
-        tables: The aircraft.
         flight: Airspeed, acceleration, nacelle angle.
         z: Unknowns.
         x: Written: state.
@@ -73,7 +73,6 @@ def trim_residual(tables: AircraftTables, flight: Flight, z: FloatArray, residua
     """Scaled residuals of a set of unknowns.
 
     Args:
-        tables: The aircraft.
         flight: Airspeed, acceleration, nacelle angle.
         z: Unknowns.
         residual: Written: residuals.
@@ -92,7 +91,6 @@ def trim_jacobian(tables: AircraftTables, flight: Flight, z: FloatArray, jacobia
     """Jacobian of the residuals by central differences.
 
     Args:
-        tables: The aircraft.
         flight: Airspeed, acceleration, nacelle angle.
         z: Unknowns.
         jacobian: Written: derivative of residual (row) with respect to unknown (column).

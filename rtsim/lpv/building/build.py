@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from rtsim.aircraft.variables import Variable
+from rtsim.arrays import FloatArray
 from rtsim.errors import TrimError
 from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.building.grid import HELICOPTER_SIDE, Grid
-from rtsim.lpv.database import GRIDDED, Database, fill_invalid, quantized
+from rtsim.lpv.cells import fill_invalid, quantized
+from rtsim.lpv.database import GRIDDED, Database
 
-FloatArray = npt.NDArray[np.float64]
 Guess = tuple[FloatArray, FloatArray]
 Jacobians = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
@@ -69,8 +69,6 @@ class GridAircraft(Protocol):
         """Trim, or None where none is found from this guess.
 
         Args:
-            airspeed: Horizontal airspeed [m/s].
-            nacelle: Nacelle angle [rad].
             acceleration: Level acceleration [m/s^2].
             guess: State and input to start from; None where there is no neighbour yet.
         """
@@ -80,8 +78,6 @@ class GridAircraft(Protocol):
 
         Args:
             point: The trim.
-            airspeed: Its airspeed [m/s].
-            nacelle: Its nacelle angle [rad].
         """
 
     def far_apart(self, point: GridPoint, neighbour: GridPoint) -> bool:
@@ -97,18 +93,11 @@ class GridAircraft(Protocol):
 
         Args:
             point: The trim.
-            airspeed: Its airspeed [m/s].
-            nacelle: Its nacelle angle [rad].
             acceleration: Its level acceleration [m/s^2].
         """
 
     def flap(self, airspeed: float, nacelle: float) -> float:
-        """Flap deflection of the schedule [rad].
-
-        Args:
-            airspeed: Horizontal airspeed [m/s].
-            nacelle: Nacelle angle [rad].
-        """
+        """Flap deflection of the schedule [rad]."""
 
 
 Row = list[GridPoint | None]

@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from rtsim.aircraft.variables import position, required_position
-from rtsim.lpv.database import GRIDDED, Database, fill_invalid
+from rtsim.arrays import BoolArray, FloatArray
+from rtsim.lpv.cells import fill_invalid
+from rtsim.lpv.database import GRIDDED, Database
 from rtsim.units import to_deg, to_kt
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Axis = Literal["airspeed", "nacelle"]
 
 NEIGHBOUR_LIMIT = 1e-2
@@ -104,7 +103,6 @@ def check_neighbours(
     """Predict every trim from its neighbours' linear models.
 
     Args:
-        database: The database.
         inside: Grid points to take part (V, N), for instance those within the corridor; None takes all valid ones.
         layer: The layer to check; None takes level flight.
 
@@ -204,7 +202,6 @@ def describe(error: NeighbourError, database: Database) -> str:
 
     Args:
         error: The pair.
-        database: Its database.
 
     Returns:
         One line of text.

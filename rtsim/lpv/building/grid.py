@@ -10,12 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from rtsim.arrays import BoolArray, FloatArray
 from rtsim.units import DEGREE, KNOT, deg, kt
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 AIRSPEED_KT = np.concatenate(
     [

@@ -14,8 +14,8 @@ import numpy as np
 
 import rtsim
 import rtsim.aircraft.xv15
-from rtsim.aircraft import INPUTS, OUTPUTS, STATES, Condition, LinearModel, TrimPoint, Variable
-from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
+from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
+from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES, Variable
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.lpv.building.build import GridPoint, Guess, Jacobians
@@ -91,8 +91,6 @@ class Xv15Grid:
         """Trim, or None where none is found from this guess.
 
         Args:
-            airspeed: Horizontal airspeed [m/s].
-            nacelle: Nacelle angle [rad].
             acceleration: Level acceleration [m/s^2].
             guess: State and input to start from.
         """
@@ -107,8 +105,6 @@ class Xv15Grid:
 
         Args:
             point: The trim.
-            airspeed: Its airspeed [m/s].
-            nacelle: Its nacelle angle [rad].
         """
         del nacelle
         if abs(point.u[INPUT.stick]) > FLYABLE_STICK:
@@ -138,8 +134,6 @@ class Xv15Grid:
 
         Args:
             point: The trim.
-            airspeed: Its airspeed [m/s].
-            nacelle: Its nacelle angle [rad].
             acceleration: Its level acceleration [m/s^2].
         """
         trim = TrimPoint(point.x, point.u, point.y, point.xdot, True, 0.0)
@@ -147,12 +141,7 @@ class Xv15Grid:
         return model.A, model.B, model.C, model.D, model.df_dnacelle
 
     def flap(self, airspeed: float, nacelle: float) -> float:
-        """Flap deflection of the schedule [rad].
-
-        Args:
-            airspeed: Horizontal airspeed [m/s].
-            nacelle: Nacelle angle [rad].
-        """
+        """Flap deflection of the schedule [rad]."""
         return float(kernels.flap_schedule(self.aircraft.tables.controls, airspeed, nacelle))
 
 
@@ -161,7 +150,6 @@ def flown_model(aircraft: Xv15, condition: Condition, trim: TrimPoint) -> Linear
 
     Args:
         aircraft: The nonlinear model.
-        condition: The flight condition.
         trim: The trim found there.
     """
     model = aircraft.linearize(condition, trim)

@@ -9,8 +9,8 @@ import numpy as np
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
-from rtsim.lpv.database import GRIDDED, Database, PilotArrays, fill_invalid
-from rtsim.lpv.validation import AXES
+from rtsim.lpv.cells import fill_invalid
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 
 OPTIONAL: Final = ("valid", "xdot_ref", "df_dnacelle", "flap", "rotor_speed")
 """Arrays that a user's own database may leave out: all cells valid, unaccelerated, and the rest zero."""
@@ -33,7 +33,6 @@ def assemble_database(
         variables: States, inputs and outputs under ``state``, ``input`` and ``output``.
         attributes: Attributes of the file.
         pilot: Pilot gains by name of the design.
-        file: Name of the file, for messages.
 
     Returns:
         The checked database.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from rtsim.aircraft.variables import Variable
-from rtsim.errors import InputError, OutputError
-from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.errors import InputError
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 from rtsim.lpv.files.assemble import KINDS, assemble_database
-from rtsim.lpv.validation import AXES
+from rtsim.whole_file import whole_file
 
 _DIMENSIONS = {"x_ref": 4, "u_ref": 4, "y_ref": 4, "xdot_ref": 4, "df_dnacelle": 4, "valid": 3, "flap": 2,
                "A": 5, "B": 5, "C": 5, "D": 5}  # fmt: skip
@@ -83,17 +81,8 @@ def write_mat(database: Database, path: str | Path) -> None:
         content["pilot"] = {
             design: {**pilot.arrays, "attributes": dict(pilot.attributes)} for design, pilot in database.pilot.items()
         }
-    target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as stream:
-            savemat(stream, content, do_compression=True, long_field_names=True)
-        part.replace(target)
-    except OSError as error:
-        raise OutputError(f"{target}: the database could not be written ({error.strerror or error}).") from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
+    with whole_file(path) as part, part.open("wb") as stream:
+        savemat(stream, content, do_compression=True, long_field_names=True)
 
 
 def _cells(texts: Sequence[str]) -> Any:

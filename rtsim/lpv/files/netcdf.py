@@ -6,8 +6,6 @@ A file is written beside its target and renamed, so a reader never meets half of
 
 from __future__ import annotations
 
-import contextlib
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -16,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.aircraft.variables import Variable
-from rtsim.errors import InputError, OutputError
-from rtsim.lpv.database import GRIDDED, Database, PilotArrays
+from rtsim.errors import InputError
+from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
 from rtsim.lpv.files.assemble import KINDS, assemble_database
-from rtsim.lpv.validation import AXES
+from rtsim.whole_file import whole_file
 
 SHIPPED: Final = Path(__file__).parents[2] / "aircraft" / "xv15" / "data" / "xv15_lpv.nc"
 """The database that comes with rtsim."""
@@ -93,17 +91,12 @@ def write_database(database: Database, path: str | Path) -> None:
     """
     import netCDF4
 
-    target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with netCDF4.Dataset(str(part), "w", format="NETCDF4") as dataset:
-            _write(dataset, database)
-        part.replace(target)
-    except (OSError, RuntimeError) as error:
-        raise OutputError(f"{target}: the database could not be written ({error}).") from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink(missing_ok=True)
+    with whole_file(path) as part:
+        try:
+            with netCDF4.Dataset(str(part), "w", format="NETCDF4") as dataset:
+                _write(dataset, database)
+        except RuntimeError as error:  # how the library tells of a full disk
+            raise OSError(str(error)) from error
 
 
 def _write(dataset: Any, database: Database) -> None:

@@ -14,7 +14,8 @@ from scipy.io import loadmat, savemat
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError, OutputError
-from rtsim.lpv.database import GRIDDED, PilotArrays, fill_invalid, quantized, round_mantissa
+from rtsim.lpv.cells import fill_invalid, quantized, round_mantissa
+from rtsim.lpv.database import GRIDDED, PilotArrays
 from rtsim.lpv.files.storage import load_database, save_database
 
 PILOT = PilotArrays(
@@ -172,7 +173,7 @@ def test_failed_write_leaves_the_old_file(toy_database, tmp_path, suffix, monkey
 
 
 def test_unwritable_target(toy_database, tmp_path, suffix):
-    with pytest.raises(OutputError, match="could not be written"):
+    with pytest.raises(OutputError, match="cannot be written"):
         save_database(toy_database, tmp_path / "absent" / f"toy{suffix}")
 
 

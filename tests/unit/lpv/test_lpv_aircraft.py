@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import rtsim
-from rtsim.aircraft import Condition
+from rtsim.aircraft.points import Condition
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError, TrimError
 from rtsim.lpv import lpv_kernels as kernels

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rtsim.aircraft import Condition
+from rtsim.aircraft.points import Condition
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.cli.model import _inside_corridor
 from rtsim.lpv.building.build import build_database

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rtsim.aids import design_aids
+from rtsim.aids.design import design_aids
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.variables import INPUTS, OUTPUTS, ROLES, SCHEDULING_SPEED, STATES, Variable, of_role, with_roles
 from rtsim.errors import InputError

@@ -52,16 +52,6 @@ def plot_groups() -> tuple[PlotGroup, ...]:
     )
 
 
-def plot_path(signal_name: str) -> str:
-    """The entity of a Rerun recording that carries a signal.
-
-    Args:
-        signal_name: Name of the column.
-    """
-    signal = next(signal for signal in LOG_SIGNALS if signal.name == signal_name)
-    return _path(signal)
-
-
 def label(signal_name: str, *, unit: bool = True) -> str:
     """A signal's name for people.
 

@@ -1,27 +1,48 @@
-"""Turns pydantic's findings about a scenario file into single sentences with key, value, range and mend."""
+"""Tables of TOML files with exact types: every mistake becomes a sentence with key, value, range and mend."""
 
 from __future__ import annotations
 
 import types
 from collections.abc import Iterable
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from rtsim.errors import InputError
-from rtsim.plugins import closest, suggestion
+from rtsim.errors import InputError, closest, suggestion
 
+Table = TypeVar("Table", bound=BaseModel)
 _KINDS = {float: "a number", int: "a whole number", str: "a text in quotes", bool: "true or false"}
 
 
-def explain(error: ValidationError, model: type[BaseModel], file: str) -> list[InputError]:
+class Strict(BaseModel):
+    """A table of a file: exact types, no unknown keys, read-only."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+def checked(model: type[Table], data: Any, *, file: str | None) -> Table:
+    """A table whose every key and value is allowed.
+
+    Args:
+        model: What the table may hold.
+        data: What it holds.
+
+    Raises:
+        InputError: For the first mistake found.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise explain(error, model, file)[0] from None
+
+
+def explain(error: ValidationError, model: type[BaseModel], file: str | None) -> list[InputError]:
     """Translate everything pydantic found.
 
     Args:
         error: What validation raised.
         model: The model that was validated.
-        file: The file, as shown to the user.
 
     Returns:
         One :class:`InputError` per problem, in the order of the file's keys.
@@ -51,7 +72,9 @@ def _is_union_tag(part: str | int) -> bool:
     return isinstance(part, str) and ("[" in part or part in {"float", "int", "str", "bool", "none"})
 
 
-def _explain_one(item: Any, location: tuple[str | int, ...], key: str, model: type[BaseModel], file: str) -> InputError:
+def _explain_one(
+    item: Any, location: tuple[str | int, ...], key: str, model: type[BaseModel], file: str | None
+) -> InputError:
     kind: str = item["type"]
     if kind == "missing":
         allowed = _allowed(_field(model, location))
@@ -67,7 +90,7 @@ def _explain_one(item: Any, location: tuple[str | int, ...], key: str, model: ty
             mend=suggestion(str(location[-1]), names, otherwise="delete it"),
         )
     field = _field(model, location)
-    allowed = _allowed(field)
+    allowed = _allowed(field) or _limit(item.get("ctx", {}))
     value = item.get("input")
     if isinstance(value, dict | list) and not (kind.startswith("too_") or kind.endswith("_short")):
         value = f"a {'table' if isinstance(value, dict) else 'list'}"
@@ -79,7 +102,7 @@ def _explain_one(item: Any, location: tuple[str | int, ...], key: str, model: ty
         elif kind == "literal_error":
             allowed = allowed or str(item["ctx"]["expected"])  # an entry of a list
         else:
-            mend = "use letters, digits and underscores"
+            allowed, mend = f"the pattern {item['ctx']['pattern']}", "correct the value"
     elif kind.startswith(("greater_than", "less_than", "finite")):
         problem, mend = "is out of range", "choose a value in this range"
     elif kind.endswith(("_type", "_parsing", "_from_float")):
@@ -146,6 +169,12 @@ def _allowed(field: FieldInfo | None) -> str | None:
         return None
     shown = f"{high:g}" if isinstance(high, float) else str(high)
     return f"{'more than ' if above else ''}{low:g} {'and at most' if above else 'to'} {shown}"
+
+
+def _limit(context: dict[str, Any]) -> str | None:
+    """The one limit that a number broke, in words."""
+    words = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
+    return next((f"{word} {context[key]:g}" for key, word in words.items() if key in context), None)
 
 
 def _model(model: type[BaseModel] | None, location: tuple[str | int, ...]) -> type[BaseModel] | None:

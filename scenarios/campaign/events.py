@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from rtsim.frame import FloatArray
+from rtsim.arrays import BoolArray, FloatArray
 from rtsim.measures.metric_kernels import VALUE
-from rtsim.measures.metrics import SECONDARY_LIMITS, BoolArray, TrialMetrics, violations
+from rtsim.measures.metrics import SECONDARY_LIMITS, TrialMetrics, violations
 
 DEEP_KT = 5.0
 """Depth beyond which an exceedance is major [kn]."""
