@@ -12,6 +12,7 @@ from typing import NamedTuple
 from rtsim.aircraft.variables import STATE
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.grid_kernels import cell
 
 # Places in the switches; 1 on, 0 off.
 RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4
@@ -75,28 +76,14 @@ class AidTables(NamedTuple):
 
 
 @inner_kernel
-def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
-    low = 0
-    high = axis.shape[0] - 1
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if axis[middle] <= value:
-            low = middle
-        else:
-            high = middle
-    share = (value - axis[low]) / (axis[low + 1] - axis[low])
-    return low, min(max(share, 0.0), 1.0)
-
-
-@inner_kernel
 def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) -> float:
     """Value of one map at a flight condition, bilinear and held outside the grid.
 
     Args:
         which: Number of the map.
     """
-    i, s = _cell(tables.airspeed, airspeed)
-    j, t = _cell(tables.nacelle, nacelle)
+    i, s = cell(tables.airspeed, airspeed)
+    j, t = cell(tables.nacelle, nacelle)
     m = tables.maps
     return (1.0 - s) * ((1.0 - t) * m[which, i, j] + t * m[which, i, j + 1]) + s * (
         (1.0 - t) * m[which, i + 1, j] + t * m[which, i + 1, j + 1]

@@ -15,6 +15,7 @@ from rtsim.aircraft.variables import position, required_position
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, TrimError
 from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.grid_kernels import cell
 from rtsim.kernels.packed import packed
 from rtsim.kernels.parts import entry_point
 from rtsim.lpv import lpv_kernels as kernels
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 
 _DERIVATIVE, _OUTPUTS = interpreted(kernels.lpv_derivative), interpreted(kernels.lpv_outputs)
+_cell = interpreted(cell)
 TRIM_TOLERANCE = 1e-9
 """Largest state derivative left by a trim of the LPV aircraft."""
 
@@ -273,12 +275,6 @@ class LpvAircraft:
                     allowed=f"{shown(axis[0]):g} to {shown(axis[-1]):g} {unit}",
                     mend=degrees if name == "nacelle" and abs(value) > 2.0 * np.pi else nonlinear,
                 )
-
-
-def _cell(axis: FloatArray, value: float) -> tuple[int, float]:
-    """Number of the interval that holds a value, and where in it, clipped to the axis."""
-    k = int(np.clip(np.searchsorted(axis, value, side="right") - 1, 0, axis.size - 2))
-    return k, float(np.clip((value - axis[k]) / (axis[k + 1] - axis[k]), 0.0, 1.0))
 
 
 def load_aircraft(path: str | Path | None = None, **options: Any) -> LpvAircraft:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.packed import Size
 
 FORM_PLAIN = 0
@@ -155,20 +156,6 @@ def auxiliary_act(tables: LpvTables, u: FloatArray) -> bool:
 
 
 @inner_kernel
-def _cell_below(axis: FloatArray, value: float) -> int:
-    """Number of the grid interval that holds a value (clipped to the first and last)."""
-    low = 0
-    high = axis.shape[0] - 1
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if axis[middle] <= value:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inner_kernel
 def _smoothstep(s: float) -> float:
     if s <= 0.0:
         return 0.0
@@ -240,8 +227,8 @@ def locate(
 
     last_v = tables.airspeed.shape[0] - 1
     last_n = tables.nacelle.shape[0] - 1
-    i = _cell_below(tables.airspeed, airspeed)
-    j = _cell_below(tables.nacelle, nacelle_angle)
+    i = cell_below(tables.airspeed, airspeed)
+    j = cell_below(tables.nacelle, nacelle_angle)
     s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
     t = (nacelle_angle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
     # 1e-9 of a cell: rounding of an angle on the stop is not an excursion

@@ -6,6 +6,7 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import allocating_kernel
+from rtsim.kernels.grid_kernels import bilinear
 from rtsim.pilot.layout_kernels import (
     DISPLAY,
     INTEGRALS,
@@ -24,7 +25,6 @@ from rtsim.pilot.layout_kernels import (
     PilotTables,
     clip,
     commanded_trim,
-    interpolate,
     observe,
     outer_command,
     own_reference,
@@ -79,7 +79,7 @@ def mocm_engage(
     own_reference(state, reference, own)
     commanded_trim(tables, own, nacelle_angle, trim)
     observe(tables, x, own, trim[0], 0.0, errors)
-    interpolate(tables, tables.cells, airspeed, nacelle_angle, roles.end, cell)
+    bilinear(tables, tables.cells, airspeed, nacelle_angle, roles.end, cell)
     plant_reference(tables, own, trim, 0.0, state[last_at : last_at + n])
     state[S_ESTIMATE + PLANT.u] = x[roles.u] - state[last_at + PLANT.u]
     state[S_ESTIMATE + PLANT.w] = x[roles.w] - state[last_at + PLANT.w]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from rtsim.aircraft.variables import RIGID_BODY_STATES
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.grid_kernels import bilinear
 from rtsim.kernels.packed import Size
 from rtsim.places import Places
 
@@ -201,47 +202,6 @@ def clip(value: float, limit: float) -> float:
 
 
 @inner_kernel
-def _cell_below(axis: FloatArray, value: float) -> int:
-    low = 0
-    high = axis.shape[0] - 1
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if axis[middle] <= value:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inner_kernel
-def interpolate(
-    tables: PilotTables, cells: FloatArray, airspeed: float, nacelle_angle: float, last: int, out: FloatArray
-) -> None:
-    """Interpolate the first entries of the cells around a point, clamped to the grid.
-
-    Args:
-        tables: Prepared pilot, for its axes.
-        cells: Its cells, gains or trims.
-        airspeed: Airspeed of the point [m/s].
-        nacelle_angle: Nacelle angle of the point [rad].
-        last: How many entries.
-        out: Receives them.
-    """
-    i = _cell_below(tables.airspeed, airspeed)
-    j = _cell_below(tables.nacelle, nacelle_angle)
-    s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
-    t = (nacelle_angle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
-    s = min(1.0, max(0.0, s))
-    t = min(1.0, max(0.0, t))
-    w0 = (1.0 - s) * (1.0 - t)
-    w1 = (1.0 - s) * t
-    w2 = s * (1.0 - t)
-    w3 = s * t
-    for k in range(last):
-        out[k] = w0 * cells[i, j, k] + w1 * cells[i, j + 1, k] + w2 * cells[i + 1, j, k] + w3 * cells[i + 1, j + 1, k]
-
-
-@inner_kernel
 def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: float, out: FloatArray) -> None:
     """Pitch and hands of the commanded trim.
 
@@ -250,7 +210,7 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
             is scratch.
     """
     count = 1 + tables.roles.hands
-    interpolate(tables, tables.trim, reference[REF_AIRSPEED], nacelle_angle, 4 * count, out)
+    bilinear(tables, tables.trim, reference[REF_AIRSPEED], nacelle_angle, 4 * count, out)
     limit = tables.numbers[N_ACCELERATION_LIMIT]
     a = min(limit, max(-limit, reference[REF_AIRSPEED_RATE]))
     for k in range(count):

@@ -23,6 +23,7 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
+from rtsim.kernels.grid_kernels import bilinear
 from rtsim.pilot.dynamics_kernels import (
     Held,
     gains_of,
@@ -62,7 +63,6 @@ from rtsim.pilot.layout_kernels import (
     clip,
     commanded_trim,
     demand,
-    interpolate,
     noise_width,
     observe,
     outer_command,
@@ -287,7 +287,7 @@ def mocm_advance_in(
         y.d[k] = state[hands_at + hands + k]
 
     noisy = noise.shape[0] > 0
-    interpolate(tables, tables.cells, state[S_FILTERED], nacelle_angle, roles.end if noisy else roles.v, cell)
+    bilinear(tables, tables.cells, state[S_FILTERED], nacelle_angle, roles.end if noisy else roles.v, cell)
     gains = gains_of(tables, cell)
     airspeed = observe(tables, x, own, trim[0], pitch_rate, held.displays)
     error_v = held.displays[DISPLAY.airspeed]

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.grid_kernels import bilinear
 from rtsim.units import GRAVITY
 
 # Places in one cell of ModelTables.cells.
@@ -94,41 +95,13 @@ def speed_range(tables: BoundaryTables, angle: float) -> tuple[float, float]:
 
 
 @inner_kernel
-def _cell_below(axis: FloatArray, value: float) -> int:
-    low = 0
-    high = axis.shape[0] - 1
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if axis[middle] <= value:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inner_kernel
 def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArray) -> None:
     """Interpolate the model, bilinear; outside the grid the nearest point holds.
 
     Args:
         out: Written: one cell, shape (CELL_SIZE,).
     """
-    i = _cell_below(tables.airspeed, airspeed)
-    j = _cell_below(tables.nacelle, nacelle)
-    s = (airspeed - tables.airspeed[i]) / (tables.airspeed[i + 1] - tables.airspeed[i])
-    t = (nacelle - tables.nacelle[j]) / (tables.nacelle[j + 1] - tables.nacelle[j])
-    s = min(1.0, max(0.0, s))
-    t = min(1.0, max(0.0, t))
-    w00 = (1.0 - s) * (1.0 - t)
-    w01 = (1.0 - s) * t
-    w10 = s * (1.0 - t)
-    w11 = s * t
-    c00 = tables.cells[i, j]
-    c01 = tables.cells[i, j + 1]
-    c10 = tables.cells[i + 1, j]
-    c11 = tables.cells[i + 1, j + 1]
-    for k in range(CELL_SIZE):
-        out[k] = w00 * c00[k] + w01 * c01[k] + w10 * c10[k] + w11 * c11[k]
+    bilinear(tables, tables.cells, airspeed, nacelle, CELL_SIZE, out)
 
 
 @inner_kernel
