@@ -13,6 +13,7 @@ from rtsim.aircraft.variables import STATE
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell
+from rtsim.places import Places
 
 # Places in the switches; 1 on, 0 off.
 RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4
@@ -20,16 +21,31 @@ AID_COUNT = 5
 """Aids that act on the controls; the switches of flaps and rotor drive follow."""
 AUTOMATIC_FLAPS, GOVERNOR = 5, 6
 SWITCH_COUNT = 7
-# Places in the state.
-PITCH_REFERENCE, ALTITUDE_REFERENCE, AIRSPEED_REFERENCE = 0, 1, 2
-ALTITUDE_INTEGRAL, AIRSPEED_INTEGRAL, SCHEDULE_AIRSPEED = 3, 4, 5
-LEVER_REFERENCE, STICK_OFFSET, LEVER_OFFSET, HANDS_LEVER, LEVER_TRIM, LAST_SWITCHES = 6, 7, 8, 9, 10, 11
-AID_STATE_SIZE = LAST_SWITCHES + AID_COUNT
-# Layers of AidTables.maps.
-MAP_STICK, MAP_PITCH_SENSITIVITY, MAP_PITCH_DAMPING, MAP_LEVER_LIFT, MAP_LEVER_THRUST, MAP_LEVER = 0, 1, 2, 3, 4, 5
-MAP_STICK_FLAPS = 6
-"""And the two after it: one for each interval between flap settings."""
-MAP_COUNT = 9
+MEMORY = Places(
+    "pitch_reference",
+    "altitude_reference",
+    "airspeed_reference",
+    "altitude_integral",
+    "airspeed_integral",
+    "schedule_airspeed",
+    "lever_reference",
+    "stick_offset",
+    "lever_offset",
+    "hands_lever",
+    "lever_trim",
+    ("last_switches", AID_COUNT),
+)
+"""Places in the state."""
+MAP = Places(
+    "stick",
+    "pitch_sensitivity",
+    "pitch_damping",
+    "lever_lift",
+    "lever_thrust",
+    "lever",
+    ("stick_flaps", 3),  # one for each interval between flap settings
+)
+"""Layers of ``AidTables.maps``."""
 
 CLIMB_PER_HEIGHT = 0.2
 """Climb rate asked for per height error in airplane mode [1/s]."""
@@ -116,7 +132,7 @@ def _path_error(state: FloatArray, x: FloatArray) -> float:
     """Change of pitch that altitude hold asks for in airplane mode, where the path follows pitch [rad]."""
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     airspeed, climb = x[STATE.u] * ct + x[STATE.w] * st, x[STATE.u] * st - x[STATE.w] * ct
-    wanted = _limited(CLIMB_PER_HEIGHT * (state[ALTITUDE_REFERENCE] - x[STATE.altitude]), FASTEST_CLIMB)
+    wanted = _limited(CLIMB_PER_HEIGHT * (state[MEMORY.altitude_reference] - x[STATE.altitude]), FASTEST_CLIMB)
     return _limited((wanted - climb) / max(abs(airspeed), 20.0), 0.12)
 
 
@@ -125,7 +141,7 @@ def _changed(state: FloatArray, switches: FloatArray) -> bool:
     """Whether a switch was moved since the last frame, or the aids have not begun."""
     changed = False
     for i in range(AID_COUNT):
-        changed = changed or switches[i] != state[LAST_SWITCHES + i]
+        changed = changed or switches[i] != state[MEMORY.last_switches + i]
     return changed
 
 
@@ -139,7 +155,7 @@ def aids_airspeed(state: FloatArray, switches: FloatArray, x: FloatArray) -> flo
     """
     if _changed(state, switches):
         return x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    return float(state[SCHEDULE_AIRSPEED])
+    return float(state[MEMORY.schedule_airspeed])
 
 
 @inner_kernel
@@ -157,38 +173,38 @@ def _terms(
     st, ct = math.sin(pitch), math.cos(pitch)
     airspeed = x[STATE.u] * ct + x[STATE.w] * st
     climb = x[STATE.u] * st - x[STATE.w] * ct
-    at = state[SCHEDULE_AIRSPEED]
+    at = state[MEMORY.schedule_airspeed]
     share = _share(tables, nacelle)
-    height_error = state[ALTITUDE_REFERENCE] - x[STATE.altitude]
-    speed_error = state[AIRSPEED_REFERENCE] - airspeed
+    height_error = state[MEMORY.altitude_reference] - x[STATE.altitude]
+    speed_error = state[MEMORY.airspeed_reference] - airspeed
 
     # A hold has the lever in its half of the flight and moves it with the trim; in the other half it is the hands'.
     helicopter_lever = airplane_lever = hands[1]
-    pitch_wanted = state[PITCH_REFERENCE]
+    pitch_wanted = state[MEMORY.pitch_reference]
     if switches[ALTITUDE_HOLD] != 0.0 or switches[AIRSPEED_HOLD] != 0.0:
-        held = state[LEVER_REFERENCE] + scheduled(tables, MAP_LEVER, at, nacelle) - state[LEVER_TRIM]
+        held = state[MEMORY.lever_reference] + scheduled(tables, MAP.lever, at, nacelle) - state[MEMORY.lever_trim]
         if switches[ALTITUDE_HOLD] != 0.0:
             w = tables.altitude_frequency
-            wanted = _limited(w * w * height_error - 1.6 * w * climb, 2.5) + state[ALTITUDE_INTEGRAL]
-            lift = max(scheduled(tables, MAP_LEVER_LIFT, at, nacelle), 4.0)
+            wanted = _limited(w * w * height_error - 1.6 * w * climb, 2.5) + state[MEMORY.altitude_integral]
+            lift = max(scheduled(tables, MAP.lever_lift, at, nacelle), 4.0)
             helicopter_lever = held + wanted / lift
             pitch_wanted += (1.0 - share) * _path_error(state, x)
         if switches[AIRSPEED_HOLD] != 0.0:
-            wanted = tables.airspeed_frequency * speed_error + state[AIRSPEED_INTEGRAL]
+            wanted = tables.airspeed_frequency * speed_error + state[MEMORY.airspeed_integral]
             wanted = _limited(wanted, 1.5)
             pitch_wanted -= share * wanted / 9.81
-            thrust = max(scheduled(tables, MAP_LEVER_THRUST, at, nacelle), 10.0)
+            thrust = max(scheduled(tables, MAP.lever_thrust, at, nacelle), 10.0)
             airplane_lever = held + wanted / thrust
     lever = share * helicopter_lever + (1.0 - share) * airplane_lever
 
-    sensitivity = min(scheduled(tables, MAP_PITCH_SENSITIVITY, at, nacelle), -0.3)
-    natural = min(scheduled(tables, MAP_PITCH_DAMPING, at, nacelle), 0.0)
+    sensitivity = min(scheduled(tables, MAP.pitch_sensitivity, at, nacelle), -0.3)
+    natural = min(scheduled(tables, MAP.pitch_damping, at, nacelle), 0.0)
     stick = hands[0]
     if switches[TRIM_BIAS] != 0.0:
-        stick += scheduled(tables, MAP_STICK, at, nacelle)
+        stick += scheduled(tables, MAP.stick, at, nacelle)
         for k in range(3):
             if flaps[k] != 0.0:
-                stick += scheduled(tables, MAP_STICK_FLAPS + k, at, nacelle) * flaps[k]
+                stick += scheduled(tables, MAP.stick_flaps + k, at, nacelle) * flaps[k]
     attitude = switches[ATTITUDE_RETENTION] + switches[ALTITUDE_HOLD] * (1.0 - share) + switches[AIRSPEED_HOLD] * share
     added = 0.0
     if attitude > 0.0:
@@ -224,20 +240,20 @@ def aids_engage(
         acting: Stick and lever that acted last.
     """
     airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    state[PITCH_REFERENCE] = x[STATE.pitch]
-    state[ALTITUDE_REFERENCE] = x[STATE.altitude]
-    state[AIRSPEED_REFERENCE] = airspeed
-    state[ALTITUDE_INTEGRAL] = 0.0
-    state[AIRSPEED_INTEGRAL] = 0.0
-    state[SCHEDULE_AIRSPEED] = airspeed
-    state[LEVER_REFERENCE] = acting[1]
-    state[HANDS_LEVER] = hands[1]
-    state[LEVER_TRIM] = scheduled(tables, MAP_LEVER, airspeed, nacelle)
+    state[MEMORY.pitch_reference] = x[STATE.pitch]
+    state[MEMORY.altitude_reference] = x[STATE.altitude]
+    state[MEMORY.airspeed_reference] = airspeed
+    state[MEMORY.altitude_integral] = 0.0
+    state[MEMORY.airspeed_integral] = 0.0
+    state[MEMORY.schedule_airspeed] = airspeed
+    state[MEMORY.lever_reference] = acting[1]
+    state[MEMORY.hands_lever] = hands[1]
+    state[MEMORY.lever_trim] = scheduled(tables, MAP.lever, airspeed, nacelle)
     stick, lever, _, _ = _terms(tables, state, switches, x, nacelle, hands, flaps)
-    state[STICK_OFFSET] = acting[0] - stick
-    state[LEVER_OFFSET] = acting[1] - lever
+    state[MEMORY.stick_offset] = acting[0] - stick
+    state[MEMORY.lever_offset] = acting[1] - lever
     for i in range(AID_COUNT):
-        state[LAST_SWITCHES + i] = switches[i]
+        state[MEMORY.last_switches + i] = switches[i]
 
 
 @inner_kernel
@@ -267,40 +283,40 @@ def aids_step(
     if _changed(state, switches):
         aids_engage(tables, state, switches, x, nacelle, hands, flaps, acting)
     airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    state[SCHEDULE_AIRSPEED] += dt / tables.schedule_time * (airspeed - state[SCHEDULE_AIRSPEED])
+    state[MEMORY.schedule_airspeed] += dt / tables.schedule_time * (airspeed - state[MEMORY.schedule_airspeed])
     stick, lever, height_error, speed_error = _terms(tables, state, switches, x, nacelle, hands, flaps)
-    stick += state[STICK_OFFSET]
-    lever += state[LEVER_OFFSET]
+    stick += state[MEMORY.stick_offset]
+    lever += state[MEMORY.lever_offset]
     acting[0] = _limited(stick, 1.0)
     acting[1] = min(max(lever, 0.0), 1.0)
     fade = dt / tables.fade_time
-    state[STICK_OFFSET] -= fade * state[STICK_OFFSET]
-    state[LEVER_OFFSET] -= fade * state[LEVER_OFFSET]
+    state[MEMORY.stick_offset] -= fade * state[MEMORY.stick_offset]
+    state[MEMORY.lever_offset] -= fade * state[MEMORY.lever_offset]
 
     start, end = tables.blend
     helicopter = nacelle > 0.5 * (start + end)
     pushed = _beyond(hands[0], tables.dead_zone)
     if not helicopter and switches[AIRSPEED_HOLD] == 0.0:
-        state[HANDS_LEVER] = hands[1]  # the throttle of an airplane; where it stands is no wish to climb later
-    moved = _beyond(hands[1] - state[HANDS_LEVER], 2.0 * tables.dead_zone)
+        state[MEMORY.hands_lever] = hands[1]  # the throttle of an airplane; where it stands is no wish to climb later
+    moved = _beyond(hands[1] - state[MEMORY.hands_lever], 2.0 * tables.dead_zone)
     if switches[AIRSPEED_HOLD] != 0.0:
-        state[AIRSPEED_REFERENCE] += dt * 1.5 * (pushed if helicopter else moved)
+        state[MEMORY.airspeed_reference] += dt * 1.5 * (pushed if helicopter else moved)
         free = abs(speed_error) < 5.0
         if free:
             gain = tables.airspeed_frequency / tables.integral_time
-            state[AIRSPEED_INTEGRAL] = _limited(state[AIRSPEED_INTEGRAL] + dt * gain * speed_error, 1.5)
+            state[MEMORY.airspeed_integral] = _limited(state[MEMORY.airspeed_integral] + dt * gain * speed_error, 1.5)
     if switches[ALTITUDE_HOLD] != 0.0:
-        state[ALTITUDE_REFERENCE] += dt * 5.0 * (moved if helicopter else -pushed)
+        state[MEMORY.altitude_reference] += dt * 5.0 * (moved if helicopter else -pushed)
         if abs(height_error) < 20.0:
             gain = tables.altitude_frequency**2 / tables.integral_time
-            state[ALTITUDE_INTEGRAL] = _limited(state[ALTITUDE_INTEGRAL] + dt * gain * height_error, 4.0)
+            state[MEMORY.altitude_integral] = _limited(state[MEMORY.altitude_integral] + dt * gain * height_error, 4.0)
         # The attitude that keeps the height changes with speed, flaps and nacelles.
-        state[PITCH_REFERENCE] += dt / PATH_TIME * (1.0 - _share(tables, nacelle)) * _path_error(state, x)
+        state[MEMORY.pitch_reference] += dt / PATH_TIME * (1.0 - _share(tables, nacelle)) * _path_error(state, x)
     held_by_hold = (switches[AIRSPEED_HOLD] != 0.0 and helicopter) or (
         switches[ALTITUDE_HOLD] != 0.0 and not helicopter
     )
     if not held_by_hold:
-        state[PITCH_REFERENCE] -= dt * tables.rate_command * pushed
+        state[MEMORY.pitch_reference] -= dt * tables.rate_command * pushed
     # The reference never runs away from an attitude the aircraft cannot follow.
     window = 8.0 * math.pi / 180.0
-    state[PITCH_REFERENCE] = x[STATE.pitch] + _limited(state[PITCH_REFERENCE] - x[STATE.pitch], window)
+    state[MEMORY.pitch_reference] = x[STATE.pitch] + _limited(state[MEMORY.pitch_reference] - x[STATE.pitch], window)

@@ -13,14 +13,7 @@ from rtsim.aids.aids_kernels import (
     ATTITUDE_RETENTION,
     AUTOMATIC_FLAPS,
     GOVERNOR,
-    MAP_COUNT,
-    MAP_LEVER,
-    MAP_LEVER_LIFT,
-    MAP_LEVER_THRUST,
-    MAP_PITCH_DAMPING,
-    MAP_PITCH_SENSITIVITY,
-    MAP_STICK,
-    MAP_STICK_FLAPS,
+    MAP,
     RATE_DAMPING,
     SWITCH_COUNT,
     TRIM_BIAS,
@@ -60,15 +53,15 @@ def design_aids(database: Database) -> AidTables:
     u, w, q, pitch_place = range(len(RIGID_BODY))
     stick, lever, *flap_columns = range(len(model.inputs))
     pitch = database.x_ref[level, ..., model.kept[pitch_place]]
-    maps = np.zeros((MAP_COUNT, len(database.airspeed), len(database.nacelle)))
-    maps[MAP_STICK] = database.u_ref[level, ..., model.inputs[stick]]
-    maps[MAP_LEVER] = database.u_ref[level, ..., model.inputs[lever]]
-    maps[MAP_PITCH_SENSITIVITY] = reduced_b[..., q, stick]
-    maps[MAP_PITCH_DAMPING] = reduced_a[..., q, q]
-    maps[MAP_LEVER_LIFT] = np.sin(pitch) * reduced_b[..., u, lever] - np.cos(pitch) * reduced_b[..., w, lever]
-    maps[MAP_LEVER_THRUST] = np.cos(pitch) * reduced_b[..., u, lever] + np.sin(pitch) * reduced_b[..., w, lever]
+    maps = np.zeros((MAP.size, len(database.airspeed), len(database.nacelle)))
+    maps[MAP.stick] = database.u_ref[level, ..., model.inputs[stick]]
+    maps[MAP.lever] = database.u_ref[level, ..., model.inputs[lever]]
+    maps[MAP.pitch_sensitivity] = reduced_b[..., q, stick]
+    maps[MAP.pitch_damping] = reduced_a[..., q, q]
+    maps[MAP.lever_lift] = np.sin(pitch) * reduced_b[..., u, lever] - np.cos(pitch) * reduced_b[..., w, lever]
+    maps[MAP.lever_thrust] = np.cos(pitch) * reduced_b[..., u, lever] + np.sin(pitch) * reduced_b[..., w, lever]
     for name, column in zip(flaps, flap_columns, strict=True):
-        place = MAP_STICK_FLAPS + FLAP_INPUTS.index(name)
+        place = MAP.stick_flaps + FLAP_INPUTS.index(name)
         maps[place] = -reduced_b[..., q, column] / reduced_b[..., q, stick]
     part = database.profile.aids
     blend = part.numbers("blend_nacelle_deg", low=0.0, high=95.0, count=2, rises=True)

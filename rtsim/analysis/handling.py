@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from rtsim.aids.aids_kernels import AID_COUNT, AID_STATE_SIZE, LAST_SWITCHES, aids_engage, aids_step
+from rtsim.aids.aids_kernels import AID_COUNT, MEMORY, aids_engage, aids_step
 from rtsim.aids.design import design_aids, switches_of
 from rtsim.arrays import FloatArray
 from rtsim.choices import AidName
@@ -59,7 +59,7 @@ def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tu
     work = np.zeros(work_size(lpv))
     x0, acting0 = trim.x.copy(), trim.u[:2].copy()
     hands0 = np.array([0.0 if "attitude_retention" in aids else acting0[0], acting0[1]])
-    state0 = np.zeros(AID_STATE_SIZE)
+    state0 = np.zeros(MEMORY.size)
     aids_engage(tables, state0, switches, x0, nacelle, hands0, np.zeros(3), acting0)
     path = np.tile([nacelle, 0.0, 0.0], (3, 1))
 
@@ -69,9 +69,9 @@ def handling(aircraft: LpvAircraft, *, airspeed: float, nacelle: float, aids: tu
         aids_step(tables, state, switches, x, nacelle, hands0 + np.array([stick, 0.0]), np.zeros(3), acting, DT)
         u[:2] = acting
         lpv_step(lpv, x, u, path, DT, work)
-        return np.concatenate([x, state[:LAST_SWITCHES]])
+        return np.concatenate([x, state[: MEMORY.last_switches]])
 
-    z0 = np.concatenate([x0, state0[:LAST_SWITCHES]])
+    z0 = np.concatenate([x0, state0[: MEMORY.last_switches]])
     a = np.array([(frame(z0 + _STEP * e, 0.0) - frame(z0 - _STEP * e, 0.0)) / (2.0 * _STEP) for e in np.eye(z0.size)]).T
     # A pulse beyond the dead zone, so that the commanded rate is seen too.
     size = 0.2

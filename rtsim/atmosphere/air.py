@@ -67,9 +67,9 @@ def new_gust_state(air: AirSpecification, normals: FloatArray | None = None) -> 
     Returns:
         The state, shape (SLOTS + slots * SLOT_SIZE,), with room for ``LIVE_SLOTS`` more gusts.
     """
-    state = np.zeros(kernels.SLOTS + kernels.SLOT_SIZE * (len(air.gusts) + LIVE_SLOTS))
+    state = np.zeros(kernels.GUST.size + kernels.SLOT.size * (len(air.gusts) + LIVE_SLOTS))
     for number, gust in enumerate(air.gusts):
-        _fill_slot(state, kernels.SLOTS + number * kernels.SLOT_SIZE, gust)
+        _fill_slot(state, kernels.GUST.size + number * kernels.SLOT.size, gust)
     if air.turbulence is not None and air.turbulent:
         if normals is None:
             raise ValueError("turbulence needs three standard normals for its first state")
@@ -79,7 +79,7 @@ def new_gust_state(air: AirSpecification, normals: FloatArray | None = None) -> 
 
 def normals_needed(state: FloatArray) -> int:
     """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3."""
-    return kernels.NORMALS_PER_FRAME if state[dryden.T_ACTIVE] != 0.0 else 0
+    return kernels.NORMALS_PER_FRAME if state[dryden.TURBULENCE.active] != 0.0 else 0
 
 
 def set_turbulence(state: FloatArray, turbulence: Turbulence, normals: FloatArray) -> None:
@@ -90,17 +90,17 @@ def set_turbulence(state: FloatArray, turbulence: Turbulence, normals: FloatArra
         turbulence: What it becomes; its ``fade_in`` is the time of the change.
         normals: Three standard normals, used only where there was no turbulence before.
     """
-    if state[dryden.T_ACTIVE] == 0.0:
+    if state[dryden.TURBULENCE.active] == 0.0:
         if turbulence.wind_at_20_ft == 0.0:
             return
-        state[dryden.T_U], state[dryden.T_W_1], state[dryden.T_W_2] = normals
-        state[dryden.T_ACTIVE] = state[kernels.G_BUSY] = 1.0
+        state[dryden.TURBULENCE.u], state[dryden.TURBULENCE.w_1], state[dryden.TURBULENCE.w_2] = normals
+        state[dryden.TURBULENCE.active] = state[kernels.GUST.busy] = 1.0
     target = turbulence.wind_at_20_ft
-    state[dryden.T_WIND_TARGET] = target
+    state[dryden.TURBULENCE.wind_target] = target
     if turbulence.fade_in > 0.0:
-        state[dryden.T_WIND_RATE] = abs(target - state[dryden.T_WIND]) / turbulence.fade_in
+        state[dryden.TURBULENCE.wind_rate] = abs(target - state[dryden.TURBULENCE.wind]) / turbulence.fade_in
     else:
-        state[dryden.T_WIND] = target
+        state[dryden.TURBULENCE.wind] = target
 
 
 def add_gust(state: FloatArray, gust: Gust) -> None:
@@ -113,8 +113,8 @@ def add_gust(state: FloatArray, gust: Gust) -> None:
     Raises:
         InputError: As many gusts as fit are still acting.
     """
-    for slot in range(kernels.SLOTS, state.shape[0], kernels.SLOT_SIZE):
-        if state[slot + kernels.SLOT_SHAPE] == kernels.SHAPE_NONE:
+    for slot in range(kernels.GUST.size, state.shape[0], kernels.SLOT.size):
+        if state[slot + kernels.SLOT.shape] == kernels.SHAPE_NONE:
             _fill_slot(state, slot, gust)
             return
     raise InputError(
@@ -128,12 +128,12 @@ def add_gust(state: FloatArray, gust: Gust) -> None:
 def _fill_slot(state: FloatArray, slot: int, gust: Gust) -> None:
     extent = gust.length if gust.duration is None else gust.duration
     assert extent is not None  # the gust was checked when it was made
-    state[slot + kernels.SLOT_SHAPE] = GUST_SHAPES[gust.shape]
-    state[slot + kernels.SLOT_START] = gust.start
-    state[slot + kernels.SLOT_FIRST] = gust.ahead
-    state[slot + kernels.SLOT_SECOND] = gust.below
-    state[slot + kernels.SLOT_EXTENT] = extent
-    state[slot + kernels.SLOT_BY_LENGTH] = 0.0 if gust.length is None else 1.0
-    state[slot + kernels.SLOT_BODY] = 1.0 if gust.axes == "body" else 0.0
-    state[slot + kernels.SLOT_TRAVELLED] = 0.0
-    state[kernels.G_BUSY] = 1.0
+    state[slot + kernels.SLOT.shape] = GUST_SHAPES[gust.shape]
+    state[slot + kernels.SLOT.start] = gust.start
+    state[slot + kernels.SLOT.first] = gust.ahead
+    state[slot + kernels.SLOT.second] = gust.below
+    state[slot + kernels.SLOT.extent] = extent
+    state[slot + kernels.SLOT.by_length] = 0.0 if gust.length is None else 1.0
+    state[slot + kernels.SLOT.body] = 1.0 if gust.axes == "body" else 0.0
+    state[slot + kernels.SLOT.travelled] = 0.0
+    state[kernels.GUST.busy] = 1.0

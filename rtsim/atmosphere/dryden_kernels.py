@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.places import Places
 from rtsim.units import FOOT
 
 LOW_ALTITUDE = 1000.0 * FOOT
@@ -27,26 +28,18 @@ LOWEST_ALTITUDE = 10.0 * FOOT
 HIGH_SCALE = 1750.0 * FOOT
 """Scale length of the medium/high-altitude model in Dryden form [m]."""
 
-# Places in the gust state's turbulence section.
-T_WIND = 0
-"""Wind at 20 ft in force [m/s]; 0 is no turbulence."""
-T_WIND_TARGET = 1
-"""Wind at 20 ft that it moves to [m/s]."""
-T_WIND_RATE = 2
-"""Size of its rate of change [m/s^2]."""
-T_U = 3
-"""State of the longitudinal filter."""
-T_W_1 = 4
-"""First state of the vertical filter."""
-T_W_2 = 5
-"""Second state of the vertical filter."""
-T_LAG = 6
-"""Vertical gust behind the lag of the pitch gust [m/s]."""
-T_W = 7
-"""Vertical gust of the present frame [m/s]."""
-T_ACTIVE = 8
-"""1 once there has been turbulence: normals are drawn every frame from then on."""
-T_SIZE = 9
+TURBULENCE = Places(
+    "wind",  # wind at 20 ft in force [m/s]; 0 is no turbulence
+    "wind_target",  # wind at 20 ft that it moves to [m/s]
+    "wind_rate",  # size of its rate of change [m/s^2]
+    "u",  # state of the longitudinal filter
+    "w_1",  # states of the vertical filter
+    "w_2",
+    "lag",  # vertical gust behind the lag of the pitch gust [m/s]
+    "w",  # vertical gust of the present frame [m/s]
+    "active",  # 1 once there has been turbulence: normals are drawn every frame from then on
+)
+"""Places in the gust state's turbulence section."""
 
 # Output weights of the vertical filter: cos 15 deg and -sin 15 deg, see docs/atmosphere.md.
 _W_FIRST = (1.0 + math.sqrt(3.0)) / math.sqrt(8.0)
@@ -204,7 +197,7 @@ def turbulence_step(
     """Move the turbulence on by a frame and give it there.
 
     Args:
-        state: State, updated in place; its first ``T_SIZE`` entries are used.
+        state: State, updated in place; its first ``TURBULENCE.size`` entries are used.
         speed: Airspeed; its size counts, and at least ``minimum_speed`` [m/s].
         dt: Length of the frame that ends now; 0 at the start of the flight [s].
         normals: Three standard normals; not read without turbulence.
@@ -212,31 +205,31 @@ def turbulence_step(
     Returns:
         Gust from ahead and from below [m/s] and pitch gust [rad/s]; exactly 0.0 without turbulence.
     """
-    if state[T_ACTIVE] == 0.0:
+    if state[TURBULENCE.active] == 0.0:
         return 0.0, 0.0, 0.0
-    change = state[T_WIND_RATE] * dt
-    wind = state[T_WIND]
-    if wind < state[T_WIND_TARGET]:
-        wind = min(state[T_WIND_TARGET], wind + change)
-    elif wind > state[T_WIND_TARGET]:
-        wind = max(state[T_WIND_TARGET], wind - change)
-    state[T_WIND] = wind
+    change = state[TURBULENCE.wind_rate] * dt
+    wind = state[TURBULENCE.wind]
+    if wind < state[TURBULENCE.wind_target]:
+        wind = min(state[TURBULENCE.wind_target], wind + change)
+    elif wind > state[TURBULENCE.wind_target]:
+        wind = max(state[TURBULENCE.wind_target], wind - change)
+    state[TURBULENCE.wind] = wind
     sigma_u, sigma_w, scale_u, scale_w = turbulence_scales(tables, altitude, wind)
     through = max(abs(speed), tables.minimum_speed)
     distance = through * dt
-    state[T_U] = advance_first_order(state[T_U], distance / scale_u, normals[0])
-    state[T_W_1], state[T_W_2] = advance_second_order(
-        state[T_W_1], state[T_W_2], distance / scale_w, normals[1], normals[2]
+    state[TURBULENCE.u] = advance_first_order(state[TURBULENCE.u], distance / scale_u, normals[0])
+    state[TURBULENCE.w_1], state[TURBULENCE.w_2] = advance_second_order(
+        state[TURBULENCE.w_1], state[TURBULENCE.w_2], distance / scale_w, normals[1], normals[2]
     )
-    vertical = sigma_w * (_W_FIRST * state[T_W_1] + _W_SECOND * state[T_W_2])
+    vertical = sigma_w * (_W_FIRST * state[TURBULENCE.w_1] + _W_SECOND * state[TURBULENCE.w_2])
     reach = 4.0 * tables.span / math.pi
     if dt > 0.0:
-        state[T_LAG] = advance_lag(state[T_LAG], state[T_W], vertical, distance / reach)
+        state[TURBULENCE.lag] = advance_lag(state[TURBULENCE.lag], state[TURBULENCE.w], vertical, distance / reach)
     else:
-        state[T_LAG] = vertical
-    state[T_W] = vertical
-    if wind == 0.0 and state[T_WIND_TARGET] == 0.0:
+        state[TURBULENCE.lag] = vertical
+    state[TURBULENCE.w] = vertical
+    if wind == 0.0 and state[TURBULENCE.wind_target] == 0.0:
         # Calmed down: the gusts themselves are over, the pitch gust's lag with them.
-        state[T_LAG] = 0.0
+        state[TURBULENCE.lag] = 0.0
         return 0.0, 0.0, 0.0
-    return sigma_u * state[T_U], vertical, -(vertical - state[T_LAG]) / reach
+    return sigma_u * state[TURBULENCE.u], vertical, -(vertical - state[TURBULENCE.lag]) / reach

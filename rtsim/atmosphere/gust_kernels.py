@@ -10,41 +10,32 @@ import math
 from typing import NamedTuple
 
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.dryden_kernels import T_ACTIVE, T_SIZE, TurbulenceTables, turbulence_step
+from rtsim.atmosphere.dryden_kernels import TURBULENCE, TurbulenceTables, turbulence_step
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.places import Places
 
-# The gust state: turbulence, what acts now, then one block of SLOT_SIZE for each discrete gust.
-G_U = T_SIZE
-"""Gust along body x of the present frame [m/s]."""
-G_W = T_SIZE + 1
-"""Gust along body z of the present frame [m/s]."""
-G_Q = T_SIZE + 2
-"""Pitch gust of the present frame [rad/s]."""
-G_AHEAD = T_SIZE + 3
-"""Horizontal gust of the present frame, from ahead positive: what an airspeed indicator sees of it [m/s]."""
-G_BELOW = T_SIZE + 4
-"""Vertical gust of the present frame, from below positive [m/s]."""
-G_BUSY = T_SIZE + 5
-"""1 while there has been turbulence or a gust is acting or to come; 0: a frame may leave ``gust_step`` out."""
-SLOTS = T_SIZE + 6
-"""Start of the discrete gusts."""
+GUST = Places(
+    ("turbulence", TURBULENCE.size),
+    "u",  # gust along body x of the present frame [m/s]
+    "w",  # gust along body z [m/s]
+    "q",  # pitch gust [rad/s]
+    "ahead",  # horizontal gust, from ahead positive: what an airspeed indicator sees of it [m/s]
+    "below",  # vertical gust, from below positive [m/s]
+    "busy",  # 1 while there has been turbulence or a gust is acting or to come; 0: a frame may leave gust_step out
+)
+"""Places in the gust state: turbulence, what acts now; then one block for each discrete gust."""
 
-# Places in a slot.
-SLOT_SHAPE = 0
-SLOT_START = 1
-SLOT_FIRST = 2
-"""Amplitude from ahead, or along body x [m/s]."""
-SLOT_SECOND = 3
-"""Amplitude from below, or along body z [m/s]."""
-SLOT_EXTENT = 4
-"""Duration [s] or length [m] of the pulse or of the rise."""
-SLOT_BY_LENGTH = 5
-"""1 if the extent is a length."""
-SLOT_BODY = 6
-"""1 if the amplitudes are along the body axes."""
-SLOT_TRAVELLED = 7
-"""How far the gust has been entered, in the unit of the extent."""
-SLOT_SIZE = 8
+SLOT = Places(
+    "shape",
+    "start",  # [s]
+    "first",  # amplitude from ahead, or along body x [m/s]
+    "second",  # amplitude from below, or along body z [m/s]
+    "extent",  # duration [s] or length [m] of the pulse or of the rise
+    "by_length",  # 1 if the extent is a length
+    "body",  # 1 if the amplitudes are along the body axes
+    "travelled",  # how far the gust has been entered, in the unit of the extent
+)
+"""Places in the block of a discrete gust."""
 
 SHAPE_NONE, SHAPE_ONE_MINUS_COSINE, SHAPE_BUILD_UP, SHAPE_RAMP = 0, 1, 2, 3
 
@@ -110,45 +101,45 @@ def gust_step(
     ahead, below, rate = turbulence_step(tables.turbulence, state, airspeed, altitude, dt, normals)
     along_x = 0.0
     along_z = 0.0
-    busy = state[T_ACTIVE]
+    busy = state[TURBULENCE.active]
     through = max(abs(airspeed), tables.turbulence.minimum_speed)
-    for slot in range(SLOTS, state.shape[0], SLOT_SIZE):
-        shape = state[slot + SLOT_SHAPE]
-        since = time - state[slot + SLOT_START]
+    for slot in range(GUST.size, state.shape[0], SLOT.size):
+        shape = state[slot + SLOT.shape]
+        since = time - state[slot + SLOT.start]
         if shape == SHAPE_NONE:
             continue
         busy = 1.0
         if since < 0.0:
             continue
-        if state[slot + SLOT_BY_LENGTH] != 0.0:
+        if state[slot + SLOT.by_length] != 0.0:
             # A gust that begins within a frame is entered for the rest of that frame only.
-            state[slot + SLOT_TRAVELLED] += through * min(dt, since)
+            state[slot + SLOT.travelled] += through * min(dt, since)
         else:
-            state[slot + SLOT_TRAVELLED] = since
-        extent = state[slot + SLOT_EXTENT]
-        share = gust_shape(shape, state[slot + SLOT_TRAVELLED], extent)
-        if shape == SHAPE_ONE_MINUS_COSINE and state[slot + SLOT_TRAVELLED] >= extent:
-            state[slot + SLOT_SHAPE] = SHAPE_NONE
-        if state[slot + SLOT_BODY] != 0.0:
-            along_x += share * state[slot + SLOT_FIRST]
-            along_z += share * state[slot + SLOT_SECOND]
+            state[slot + SLOT.travelled] = since
+        extent = state[slot + SLOT.extent]
+        share = gust_shape(shape, state[slot + SLOT.travelled], extent)
+        if shape == SHAPE_ONE_MINUS_COSINE and state[slot + SLOT.travelled] >= extent:
+            state[slot + SLOT.shape] = SHAPE_NONE
+        if state[slot + SLOT.body] != 0.0:
+            along_x += share * state[slot + SLOT.first]
+            along_z += share * state[slot + SLOT.second]
         else:
-            ahead += share * state[slot + SLOT_FIRST]
-            below += share * state[slot + SLOT_SECOND]
-    state[G_BUSY] = busy
+            ahead += share * state[slot + SLOT.first]
+            below += share * state[slot + SLOT.second]
+    state[GUST.busy] = busy
     if ahead == 0.0 and below == 0.0 and along_x == 0.0 and along_z == 0.0 and rate == 0.0:
-        for place in range(G_U, G_BUSY):
+        for place in range(GUST.u, GUST.busy):
             state[place] = 0.0
         out[0] = out[1] = out[2] = 0.0
         return
     sine = math.sin(pitch)
     cosine = math.cos(pitch)
     # + 0.0 turns a negative zero into zero: a gust of nothing is the same number as no gust.
-    state[G_U] = (ahead * cosine - below * sine + along_x) + 0.0
-    state[G_W] = (ahead * sine + below * cosine + along_z) + 0.0
-    state[G_Q] = rate + 0.0
-    state[G_AHEAD] = (ahead + along_x * cosine + along_z * sine) + 0.0
-    state[G_BELOW] = (below + along_z * cosine - along_x * sine) + 0.0
-    out[0] = state[G_U]
-    out[1] = state[G_W]
-    out[2] = state[G_Q]
+    state[GUST.u] = (ahead * cosine - below * sine + along_x) + 0.0
+    state[GUST.w] = (ahead * sine + below * cosine + along_z) + 0.0
+    state[GUST.q] = rate + 0.0
+    state[GUST.ahead] = (ahead + along_x * cosine + along_z * sine) + 0.0
+    state[GUST.below] = (below + along_z * cosine - along_x * sine) + 0.0
+    out[0] = state[GUST.u]
+    out[1] = state[GUST.w]
+    out[2] = state[GUST.q]

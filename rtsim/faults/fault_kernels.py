@@ -17,6 +17,7 @@ from rtsim.aircraft.xv15.dynamics_kernels import commanded_controls
 from rtsim.aircraft.xv15.tables import ControlTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.places import Places
 
 # Kinds, as numbers in the schedule.
 KIND_NACELLE_JAMMED = 0
@@ -28,48 +29,35 @@ KIND_AIRSPEED_BIAS = 5
 KIND_AIRSPEED_FROZEN = 6
 KIND_ENGINE_LIMIT = 7
 
-# Columns of the schedule.
-AT_TIME = 0
-AT_KIND = 1
-AT_CHANNEL = 2
-"""Actuator: 0 collective, 1 cyclic, 2 elevator; else unused."""
-AT_VALUE = 3
-"""Rate limit [rad/s], bias [m/s], shaft power available [W], or -1 / 1 for the lower / upper stop; by kind."""
-AT_RATE = 4
-"""Rate towards the stop of a hard-over [rad/s]."""
-AT_ON = 5
-"""1: begins; 0: ends."""
-SCHEDULE_COLUMNS = 6
+EVENT = Places(
+    "time",
+    "kind",
+    "channel",  # actuator: 0 collective, 1 cyclic, 2 elevator; else unused
+    "value",  # rate limit [rad/s], bias [m/s], shaft power available [W], or -1 / 1 for the lower / upper stop; by kind
+    "rate",  # rate towards the stop of a hard-over [rad/s]
+    "on",  # 1: begins; 0: ends
+)
+"""Columns of the schedule of failures."""
 
-# Places in the state.
-F_NEXT = 0
-"""Next row of the schedule."""
-F_JAMMED = 1
-"""1 while the nacelles are jammed."""
-F_NACELLE_SLOW = 2
-"""1 while the nacelle rate is limited."""
-F_NACELLE_RATE = 3
-"""Its limit [rad/s]."""
-F_ACTUATOR = 4
-"""Start of three blocks (collective, cyclic, elevator) of ACTUATOR_BLOCK numbers."""
-A_MODE = 0
-"""0 sound, else KIND_STUCK, KIND_SLOW or KIND_HARD_OVER."""
-A_VALUE = 1
-"""Held angle [rad] when stuck, rate limit [rad/s] when slow, -1 or 1 for the stop of a hard-over."""
-A_RATE = 2
-"""Rate of a hard-over [rad/s]."""
-ACTUATOR_BLOCK = 3
-F_FROZEN = 13
-"""1 while the airspeed indication stands still."""
-F_HELD = 14
-"""The airspeed it stands at [m/s]."""
-F_BIAS = 15
-"""Added to the indicated airspeed [m/s]."""
-F_ENGINE = 16
-"""1 while the power is limited."""
-F_POWER = 17
-"""Shaft power of both rotors that the engines can give [W]."""
-FAULT_STATE_SIZE = 18
+ACTUATOR = Places(
+    "mode",  # 0 sound, else KIND_STUCK, KIND_SLOW or KIND_HARD_OVER
+    "value",  # held angle [rad] when stuck, rate limit [rad/s] when slow, -1 or 1 for the stop of a hard-over
+    "rate",  # rate of a hard-over [rad/s]
+)
+"""Places in the block of one actuator."""
+FAULT = Places(
+    "next",  # next row of the schedule
+    "jammed",  # 1 while the nacelles are jammed
+    "nacelle_slow",  # 1 while the nacelle rate is limited
+    "nacelle_rate",  # its limit [rad/s]
+    ("actuators", 3 * ACTUATOR.size),  # collective, cyclic, elevator
+    "frozen",  # 1 while the airspeed indication stands still
+    "held",  # the airspeed it stands at [m/s]
+    "bias",  # added to the indicated airspeed [m/s]
+    "engine",  # 1 while the power is limited
+    "power",  # shaft power of both rotors that the engines can give [W]
+)
+"""Places in the state."""
 
 ACTUATOR_STATES = (STATE.collective_75, STATE.cyclic_1s, STATE.elevator)
 """State of each actuator channel."""
@@ -115,35 +103,35 @@ def fault_apply(
         frequency: Natural frequency of the conversion actuator [rad/s].
         airspeed: What a sound airspeed indicator shows [m/s].
     """
-    kind = int(change[AT_KIND])
-    on = change[AT_ON]
-    value = change[AT_VALUE]
+    kind = int(change[EVENT.kind])
+    on = change[EVENT.on]
+    value = change[EVENT.value]
     if kind == KIND_NACELLE_JAMMED:
-        if on != 0.0 and state[F_JAMMED] == 0.0:
+        if on != 0.0 and state[FAULT.jammed] == 0.0:
             # From here the critically damped actuator runs out as one exponential: it never turns back.
             nacelle[0] = nacelle[1] + nacelle[2] / frequency
-        state[F_JAMMED] = on
+        state[FAULT.jammed] = on
     elif kind == KIND_NACELLE_SLOW:
-        state[F_NACELLE_SLOW] = on
-        state[F_NACELLE_RATE] = value
+        state[FAULT.nacelle_slow] = on
+        state[FAULT.nacelle_rate] = value
     elif KIND_STUCK <= kind <= KIND_HARD_OVER:
-        channel = int(change[AT_CHANNEL])
-        place = F_ACTUATOR + ACTUATOR_BLOCK * channel
+        channel = int(change[EVENT.channel])
+        place = FAULT.actuators + ACTUATOR.size * channel
         if on != 0.0:
-            state[place + A_MODE] = kind
-            state[place + A_VALUE] = x[ACTUATOR_STATES[channel]] if kind == KIND_STUCK else value
-            state[place + A_RATE] = change[AT_RATE]
-        elif state[place + A_MODE] == kind:
-            state[place + A_MODE] = 0.0
+            state[place + ACTUATOR.mode] = kind
+            state[place + ACTUATOR.value] = x[ACTUATOR_STATES[channel]] if kind == KIND_STUCK else value
+            state[place + ACTUATOR.rate] = change[EVENT.rate]
+        elif state[place + ACTUATOR.mode] == kind:
+            state[place + ACTUATOR.mode] = 0.0
     elif kind == KIND_AIRSPEED_BIAS:
-        state[F_BIAS] = value if on != 0.0 else 0.0
+        state[FAULT.bias] = value if on != 0.0 else 0.0
     elif kind == KIND_AIRSPEED_FROZEN:
-        if on != 0.0 and state[F_FROZEN] == 0.0:
-            state[F_HELD] = airspeed + state[F_BIAS]
-        state[F_FROZEN] = on
+        if on != 0.0 and state[FAULT.frozen] == 0.0:
+            state[FAULT.held] = airspeed + state[FAULT.bias]
+        state[FAULT.frozen] = on
     elif kind == KIND_ENGINE_LIMIT:
-        state[F_ENGINE] = on
-        state[F_POWER] = value
+        state[FAULT.engine] = on
+        state[FAULT.power] = value
 
 
 @inner_kernel
@@ -165,27 +153,27 @@ def fault_update(
         frequency: Natural frequency of the conversion actuator [rad/s].
         airspeed: What a sound airspeed indicator shows [m/s].
     """
-    number = int(state[F_NEXT])
-    while number < tables.schedule.shape[0] and tables.schedule[number, AT_TIME] <= time + _SAME_TIME:
+    number = int(state[FAULT.next])
+    while number < tables.schedule.shape[0] and tables.schedule[number, EVENT.time] <= time + _SAME_TIME:
         fault_apply(state, tables.schedule[number], x, nacelle, frequency, airspeed)
         number += 1
-    state[F_NEXT] = number
+    state[FAULT.next] = number
 
 
 @inner_kernel
 def fault_mask(state: FloatArray) -> int:
     """Give the active failures as a sum of ``MASK_*``."""
     mask = 0
-    if state[F_JAMMED] != 0.0:
+    if state[FAULT.jammed] != 0.0:
         mask |= MASK_JAMMED
-    if state[F_NACELLE_SLOW] != 0.0:
+    if state[FAULT.nacelle_slow] != 0.0:
         mask |= MASK_NACELLE_SLOW
     for channel in range(3):
-        if state[F_ACTUATOR + ACTUATOR_BLOCK * channel] != 0.0:
+        if state[FAULT.actuators + ACTUATOR.size * channel] != 0.0:
             mask |= MASK_COLLECTIVE << channel
-    if state[F_FROZEN] != 0.0 or state[F_BIAS] != 0.0:
+    if state[FAULT.frozen] != 0.0 or state[FAULT.bias] != 0.0:
         mask |= MASK_AIRSPEED
-    if state[F_ENGINE] != 0.0:
+    if state[FAULT.engine] != 0.0:
         mask |= MASK_ENGINE
     return mask
 
@@ -193,7 +181,7 @@ def fault_mask(state: FloatArray) -> int:
 @inner_kernel
 def fault_nacelle_ok(state: FloatArray) -> bool:
     """Tell whether the conversion actuator follows its commands, however slowly."""
-    return state[F_JAMMED] == 0.0
+    return state[FAULT.jammed] == 0.0
 
 
 @inner_kernel
@@ -203,9 +191,9 @@ def fault_airspeed_error(state: FloatArray, airspeed: float) -> float:
     Args:
         airspeed: What a sound indicator shows [m/s].
     """
-    if state[F_FROZEN] != 0.0:
-        return state[F_HELD] - airspeed
-    return state[F_BIAS]
+    if state[FAULT.frozen] != 0.0:
+        return state[FAULT.held] - airspeed
+    return state[FAULT.bias]
 
 
 @inner_kernel
@@ -218,10 +206,10 @@ def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
     Returns:
         The rate that acts [rad/s]; the commanded one where nothing has failed.
     """
-    if state[F_JAMMED] != 0.0:
+    if state[FAULT.jammed] != 0.0:
         return 0.0
-    if state[F_NACELLE_SLOW] != 0.0:
-        limit = state[F_NACELLE_RATE]
+    if state[FAULT.nacelle_slow] != 0.0:
+        limit = state[FAULT.nacelle_rate]
         return min(max(rate, -limit), limit)
     return rate
 
@@ -238,7 +226,7 @@ def collective_rate_limit(
     """
     along_mast = x[STATE.u] * math.cos(nacelle_angle) - x[STATE.w] * math.sin(nacelle_angle)
     slope = tables.power_per_collective + tables.power_per_collective_speed * max(along_mast, 0.0)
-    return tables.governor_frequency * (state[F_POWER] - power) / slope
+    return tables.governor_frequency * (state[FAULT.power] - power) / slope
 
 
 @inner_kernel
@@ -270,17 +258,17 @@ def fault_actuators_begin(
     planned[0] = planned[1] = planned[2] = math.nan
     power, governed = drive
     # Without its governor the rotor slows where the power is short; nothing takes the collective back.
-    limited = governed and state[F_ENGINE] != 0.0
-    failed = state[F_ACTUATOR] != 0.0 or state[F_ACTUATOR + ACTUATOR_BLOCK] != 0.0
-    failed = failed or state[F_ACTUATOR + 2 * ACTUATOR_BLOCK] != 0.0
+    limited = governed and state[FAULT.engine] != 0.0
+    failed = state[FAULT.actuators] != 0.0 or state[FAULT.actuators + ACTUATOR.size] != 0.0
+    failed = failed or state[FAULT.actuators + 2 * ACTUATOR.size] != 0.0
     if not (limited or failed):
         return
     collective, cyclic, elevator = commanded_controls(controls, commands[0], commands[1], nacelle_angle)
     low = curve(controls.collective_range, 0, nacelle_angle)
     high = curve(controls.collective_range, 1, nacelle_angle)
     for channel in range(3):
-        place = F_ACTUATOR + ACTUATOR_BLOCK * channel
-        mode = state[place + A_MODE]
+        place = FAULT.actuators + ACTUATOR.size * channel
+        mode = state[place + ACTUATOR.mode]
         begin = x[ACTUATOR_STATES[channel]]
         command, lower, upper = collective, low, high
         if channel == 1:
@@ -291,13 +279,13 @@ def fault_actuators_begin(
         own = begin + gone * (command - begin)
         end = own
         if mode == KIND_STUCK:
-            end = state[place + A_VALUE]
+            end = state[place + ACTUATOR.value]
         elif mode == KIND_SLOW:
-            most = state[place + A_VALUE] * dt
+            most = state[place + ACTUATOR.value] * dt
             end = min(max(own, begin - most), begin + most)
         elif mode == KIND_HARD_OVER:
-            most = state[place + A_RATE] * dt
-            stop = upper if state[place + A_VALUE] > 0.0 else lower
+            most = state[place + ACTUATOR.rate] * dt
+            stop = upper if state[place + ACTUATOR.value] > 0.0 else lower
             end = begin + min(max(stop - begin, -most), most)
         # A stuck or run-away collective is beyond the governor's reach.
         if channel == 0 and limited and mode != KIND_STUCK and mode != KIND_HARD_OVER:  # noqa: PLR1714

@@ -53,7 +53,7 @@ def fault_tables(faults: Sequence[Fault], profile: AircraftProfile | None = None
         InputError: A value of the aircraft's governor is missing or out of range.
     """
     governor = (xv15_profile() if profile is None else profile).systems.table("governor")
-    schedule = np.zeros((0, kernels.SCHEDULE_COLUMNS))
+    schedule = np.zeros((0, kernels.EVENT.size))
     changes = fault_changes(faults)
     if changes:
         schedule = np.stack([fault_change(fault, on=on, time=time, profile=profile) for time, fault, on in changes])
@@ -69,4 +69,4 @@ def fault_tables(faults: Sequence[Fault], profile: AircraftProfile | None = None
 
 def new_fault_state() -> FloatArray:
     """Give the fault state of a sound aircraft, shape (FAULT_STATE_SIZE,)."""
-    return np.zeros(kernels.FAULT_STATE_SIZE)
+    return np.zeros(kernels.FAULT.size)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, MEMORY
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.gust_kernels import G_BUSY
+from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.corridor.corridor_kernels import corridor_level_step
-from rtsim.faults.fault_kernels import F_ENGINE, F_POWER, fault_actuators_end, fault_nacelle_rate
+from rtsim.faults.fault_kernels import FAULT, fault_actuators_end, fault_nacelle_rate
 from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
@@ -85,7 +85,7 @@ def aid(flight: Flight) -> None:
         # Held controls are what acted last, aids included: a second helping would run them away.
         aided[CHANNEL.stick], aided[CHANNEL.lever] = hands[CHANNEL.stick], hands[CHANNEL.lever]
         # Whoever takes over later finds the aids to be engaged anew.
-        state.aids[LAST_SWITCHES] = -1.0
+        state.aids[MEMORY.last_switches] = -1.0
     else:
         aided[CHANNEL.stick], aided[CHANNEL.lever] = state.u[INPUT.stick], state.u[INPUT.lever]
         call_at(flight.parts[PART.aids], flight)
@@ -108,8 +108,8 @@ def protect(flight: Flight) -> None:
         call_at(flight.parts[PART.decide], flight)
     law_apply(tables.protection, state.protection, aided, limited)
     law_state, si = state.protection, scratch.si
-    _note_change(flight, law_state[law.L_STICK_CAUSE], law_state[law.L_LEVER_CAUSE], law_state[law.L_RATE_CAUSE])
-    si[QUANTITY.time_to_limit] = law_state[law.L_TIME]
+    _note_change(flight, law_state[law.LAW.stick_cause], law_state[law.LAW.lever_cause], law_state[law.LAW.rate_cause])
+    si[QUANTITY.time_to_limit] = law_state[law.LAW.time]
 
 
 @inner_kernel
@@ -136,7 +136,7 @@ def hold(flight: Flight) -> None:
     held = state.held
     if math.isnan(held[HELD.stick]) and math.isnan(held[HELD.lever]) and math.isnan(held[HELD.nacelle_rate]):
         return
-    if state.protection[law.L_OVERRIDE] != 0.0:
+    if state.protection[law.LAW.override] != 0.0:
         return
     limited = scratch.command[STATION.protected]
     for channel in range(CHANNEL.size):
@@ -242,7 +242,7 @@ def _turn_systems(flight: Flight) -> None:
     flap_advance(tables.flaps, state.flaps, automatic, scratch.scheduled[0], tables.dt)
     torque = 2.0 * scratch.y[OUTPUT.torque]
     lever = scratch.command[STATION.acting, CHANNEL.lever]
-    available = state.faults[F_POWER] if state.faults[F_ENGINE] != 0.0 else tables.drive.power[-1]
+    available = state.faults[FAULT.power] if state.faults[FAULT.engine] != 0.0 else tables.drive.power[-1]
     drive_advance(tables.drive, state.drive, governed, torque, lever, available, tables.dt)
 
 
@@ -281,7 +281,7 @@ def disturb(flight: Flight, elapsed: float, normals: FloatArray) -> None:
         elapsed: Length of the frame before; 0 at the start of the flight [s].
         normals: Standard normals of the air; not read where there is no turbulence.
     """
-    if flight.state.gusts[G_BUSY] != 0.0:
+    if flight.state.gusts[GUST.busy] != 0.0:
         call_at(flight.parts[PART.air], flight, elapsed, normals)
     if faults_act(flight):
         call_at(flight.parts[PART.faults], flight)

@@ -14,7 +14,7 @@ import numpy as np
 
 from rtsim.aircraft.variables import INPUT
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.dryden_kernels import T_ACTIVE
+from rtsim.atmosphere.dryden_kernels import TURBULENCE
 from rtsim.atmosphere.gust_kernels import NORMALS_PER_FRAME
 from rtsim.frame import SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
@@ -150,7 +150,7 @@ class Flying:
         if stages & COMPLETE or frames > 1:
             if self.noise_width:
                 noise = self.streams[0].standard_normal((frames, self.noise_width))
-            if self._gusts.item(T_ACTIVE):
+            if self._gusts.item(TURBULENCE.active):
                 air = self.streams[1].standard_normal((frames, NORMALS_PER_FRAME))
         flown = self._call(self.flight, rows, noise, air, frames, stages)
         if flown >= 0.0:

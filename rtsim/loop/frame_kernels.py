@@ -17,7 +17,7 @@ Legend:
 from __future__ import annotations
 
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.gust_kernels import G_BUSY
+from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.kernels.compiled import batch_kernel, inner_kernel, part
 from rtsim.kernels.parts import call_at
 from rtsim.loop.advance_kernels import (
@@ -95,7 +95,7 @@ def missing_part(flight: Flight) -> int:
         return 1 + PART.aids
     if tables.protection.law != LAW_OFF and parts[PART.decide] == 0:
         return 1 + PART.decide
-    if flight.state.gusts[G_BUSY] != 0.0 and parts[PART.air] == 0:
+    if flight.state.gusts[GUST.busy] != 0.0 and parts[PART.air] == 0:
         return 1 + PART.air
     if faults_act(flight) and parts[PART.faults] == 0:
         return 1 + PART.faults

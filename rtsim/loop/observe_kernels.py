@@ -7,7 +7,7 @@ import math
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.gust_kernels import G_AHEAD, G_Q, G_U, G_W
+from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import corridor_margins
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
@@ -65,10 +65,10 @@ def observe(flight: Flight) -> None:
     angle, rate = scratch.motion[MOTION.angle], scratch.motion[MOTION.rate]
     state.u[INPUT.nacelle_rate] = rate
     state.u[INPUT.nacelle_acceleration] = scratch.motion[MOTION.acceleration]
-    state.u[INPUT.gust_u] = gusts[G_U]
-    state.u[INPUT.gust_w] = gusts[G_W]
-    state.u[INPUT.gust_q] = gusts[G_Q]
-    speed = math.sqrt((x[STATE.u] + gusts[G_U]) ** 2 + (x[STATE.w] + gusts[G_W]) ** 2)
+    state.u[INPUT.gust_u] = gusts[GUST.u]
+    state.u[INPUT.gust_w] = gusts[GUST.w]
+    state.u[INPUT.gust_q] = gusts[GUST.q]
+    speed = math.sqrt((x[STATE.u] + gusts[GUST.u]) ** 2 + (x[STATE.w] + gusts[GUST.w]) ** 2)
     flap_scheduled = nonlinear.flap_schedule(tables.plant.controls, speed, angle)
     scratch.scheduled[0] = flap_scheduled
     flap_inputs(tables.flaps, state.flaps, flap_scheduled, state.u)
@@ -77,7 +77,7 @@ def observe(flight: Flight) -> None:
     call_at(flight.parts[PART.outputs], aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     through = x[STATE.u] * ct + x[STATE.w] * st
-    airspeed = through + gusts[G_AHEAD]
+    airspeed = through + gusts[GUST.ahead]
     climb = x[STATE.u] * st - x[STATE.w] * ct
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
     _see(flight, airspeed)
@@ -104,7 +104,7 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.climb_rate] = climb
     si[QUANTITY.distance] = state.clock[CLOCK.distance]
     si[QUANTITY.flight_path] = math.atan2(climb, max(abs(through), 1.0))
-    ahead, below = x[STATE.u] + gusts[G_U], x[STATE.w] + gusts[G_W]
+    ahead, below = x[STATE.u] + gusts[GUST.u], x[STATE.w] + gusts[GUST.w]
     si[QUANTITY.angle_of_attack] = scheduling_alpha(ahead, below, st, ct, tables.plant.alpha_speed)
     si[QUANTITY.pitch_rate] = x[STATE.q]
     si[QUANTITY.body_u] = x[STATE.u]
@@ -130,9 +130,9 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.on_downstop] = 1.0 if on_downstop(tables.nacelle, angle) else 0.0
     si[QUANTITY.pilot_mode] = state.clock[CLOCK.mode]
     si[QUANTITY.airspeed_indicated] = scratch.shown[0]
-    si[QUANTITY.gust_u] = gusts[G_U]
-    si[QUANTITY.gust_w] = gusts[G_W]
-    si[QUANTITY.gust_q] = gusts[G_Q]
+    si[QUANTITY.gust_u] = gusts[GUST.u]
+    si[QUANTITY.gust_w] = gusts[GUST.w]
+    si[QUANTITY.gust_q] = gusts[GUST.q]
     si[QUANTITY.failures] = float(fault_mask(state.faults))
 
 
@@ -170,7 +170,7 @@ def _see(flight: Flight, airspeed: float) -> None:
         corridor_margins(tables.corridor, shown[0], scratch.motion[MOTION.angle], shown[1:])
     for k in range(x.shape[0]):
         seen[k] = x[k]
-    shift = state.gusts[G_AHEAD] + error
+    shift = state.gusts[GUST.ahead] + error
     if shift != 0.0:
         seen[STATE.u] += shift * math.cos(x[STATE.pitch])
         seen[STATE.w] += shift * math.sin(x[STATE.pitch])

@@ -8,7 +8,7 @@ from rtsim.aids.aids_kernels import GOVERNOR, aids_airspeed, aids_step
 from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.gust_kernels import G_AHEAD, gust_step
+from rtsim.atmosphere.gust_kernels import GUST, gust_step
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
@@ -120,7 +120,7 @@ def schedule_faults(flight: Flight) -> float:
     """
     tables, state, x = flight.tables, flight.state, flight.state.x
     time = state.clock[CLOCK.frame] * tables.dt
-    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch]) + state.gusts[G_AHEAD]
+    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch]) + state.gusts[GUST.ahead]
     fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
     return 0.0
 

@@ -17,7 +17,7 @@ from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import part
-from rtsim.lpv.lpv_kernels import W_FLAGS, LpvTables, lpv_outputs, lpv_step
+from rtsim.lpv.lpv_kernels import WORK, LpvTables, lpv_outputs, lpv_step
 
 
 @part
@@ -58,7 +58,7 @@ def step_of_lpv(lpv: LpvTables, x: FloatArray, u: FloatArray, path: FloatArray, 
         The flags of ``rtsim.lpv.lpv_kernels``.
     """
     lpv_step(lpv, x, u, path, dt, work)
-    return float(work[W_FLAGS])
+    return float(work[WORK.flags])
 
 
 @part

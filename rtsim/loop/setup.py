@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids.aids_kernels import AID_STATE_SIZE, AUTOMATIC_FLAPS, GOVERNOR, LAST_SWITCHES
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, MEMORY
 from rtsim.aids.design import design_aids, switches_of
 from rtsim.aircraft.controls import control_tables
 from rtsim.aircraft.points import Condition
@@ -63,7 +63,7 @@ from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
-from rtsim.protection.law_data import LAW_STATE_SIZE, WORK_SIZE, ProtectionTables
+from rtsim.protection.law_data import LAW, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
@@ -322,13 +322,13 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         reference=np.array([airspeed, 0.0]),
         level=new_level_state(),
         pilot=np.zeros(interpreted(pilot_state_size)(parts.tables.pilot)),
-        aids=np.zeros(AID_STATE_SIZE),
+        aids=np.zeros(MEMORY.size),
         switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
         drive=np.zeros(DRIVE_STATE_SIZE),
         gusts=new_gust_state(setup.air, air_normals),
         faults=new_fault_state(),
-        protection=np.zeros(LAW_STATE_SIZE),
+        protection=np.zeros(LAW.size),
         held=held,
         script=new_script_state(),
         clock=clock,
@@ -338,7 +338,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     state.drive[GOVERNED] = 1.0
     interpreted(law_start)(parts.tables.protection, state.protection)
     if options.aids:
-        state.aids[LAST_SWITCHES] = -1.0  # engaged in the first frame, from the trim
+        state.aids[MEMORY.last_switches] = -1.0  # engaged in the first frame, from the trim
     return state
 
 

@@ -29,7 +29,7 @@ from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, 
 from rtsim.lpv.database import Database
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
-from rtsim.protection.law_data import L_OVERRIDE
+from rtsim.protection.law_data import LAW
 from rtsim.protection.laws import load_laws
 from rtsim.systems.flap_kernels import FLAP_SETTING
 from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, trim_throttle
@@ -348,12 +348,12 @@ class Simulation:
         Args:
             on: The pilot overrides.
         """
-        self._state.protection[L_OVERRIDE] = 1.0 if on else 0.0
+        self._state.protection[LAW.override] = 1.0 if on else 0.0
 
     @property
     def protection_overridden(self) -> bool:
         """Whether the pilot has taken the authority from the protection."""
-        return float(self._state.protection[L_OVERRIDE]) != 0.0
+        return float(self._state.protection[LAW.override]) != 0.0
 
     def snapshot(self) -> Snapshot:
         """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""

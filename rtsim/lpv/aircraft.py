@@ -61,7 +61,7 @@ class LpvAircraft:
     @property
     def flags(self) -> int:
         """Flags of the last derivative, output or step: 0 inside the grid, else bits ``lpv_kernels.FLAG_*``."""
-        return int(self._work[kernels.W_FLAGS])
+        return int(self._work[kernels.WORK.flags])
 
     def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
         """State derivative.
@@ -73,7 +73,7 @@ class LpvAircraft:
             The state derivative (nx,).
         """
         xdot = np.empty(x.size)
-        self._work[kernels.W_FLAGS] = 0.0
+        self._work[kernels.WORK.flags] = 0.0
         kernels.lpv_derivative(self.tables, x, u, nacelle_angle, xdot, self._work)
         return xdot
 
@@ -87,7 +87,7 @@ class LpvAircraft:
             The outputs (ny,).
         """
         y = np.empty(len(self.database.outputs))
-        self._work[kernels.W_FLAGS] = 0.0
+        self._work[kernels.WORK.flags] = 0.0
         kernels.lpv_outputs(self.tables, x, u, nacelle_angle, y, self._work)
         return y
 
@@ -158,7 +158,7 @@ class LpvAircraft:
             residual = self._trim_residual(derivative, z, airspeed, nacelle, acceleration)
         x, u = z[: x.size].copy(), z[x.size :].copy()
         xdot, y = np.empty(x.size), np.empty(len(self.database.outputs))
-        self._work[kernels.W_FLAGS] = 0.0
+        self._work[kernels.WORK.flags] = 0.0
         derivative(self.tables, x, u, nacelle, xdot, self._work)
         inside = self.flags == 0
         outputs(self.tables, x, u, nacelle, y, self._work)
@@ -252,7 +252,7 @@ class LpvAircraft:
         x, u = z[:nx], z[nx:]
         iu, iw, ip = (required_position(d.states, name, "trim") for name in ("u", "w", "pitch"))
         rest = np.empty(nx)
-        self._work[kernels.W_FLAGS] = 0.0
+        self._work[kernels.WORK.flags] = 0.0
         derivative(self.tables, x, u, nacelle, rest, self._work)
         rest[iu] -= acceleration * np.cos(x[ip])
         rest[iw] -= acceleration * np.sin(x[ip])

@@ -22,8 +22,7 @@ from rtsim.lpv.schedule_kernels import (
     REFRESH_EVERY_STAGE,
     REFRESH_ONCE,
     REFRESH_REFERENCE,
-    W_BLEND,
-    W_FLAGS,
+    WORK,
     LpvRoles,
     LpvTables,
     auxiliary_act,
@@ -47,7 +46,7 @@ __all__ = [
     "REFRESH_EVERY_STAGE",
     "REFRESH_ONCE",
     "REFRESH_REFERENCE",
-    "W_FLAGS",
+    "WORK",
     "LpvTables",
     "lpv_derivative",
     "lpv_outputs",
@@ -141,18 +140,18 @@ def lpv_derivative(
         xdot: Receives the state derivative (nx,).
         work: Scratch of ``work_size(tables)`` values.
     """
-    inputs_end = W_BLEND + tables.roles.states + tables.roles.inputs
+    inputs_end = WORK.size + tables.roles.states + tables.roles.inputs
     of_inputs, block = _acting(tables, u)
     sums, scratch = rows_at(tables), scratch_at(tables)
     i, j = locate(tables, x, u, nacelle_angle, work)
-    blend(tables.cells, i, j, block, work, work[W_BLEND : W_BLEND + block])
+    blend(tables.cells, i, j, block, work, work[WORK.size : WORK.size + block])
     _apply(
         tables,
         x,
         u,
         xdot,
-        work[W_BLEND:inputs_end],
-        work[inputs_end : W_BLEND + block],
+        work[WORK.size : inputs_end],
+        work[inputs_end : WORK.size + block],
         work[scratch:],
         work[sums:scratch],
         of_inputs,
@@ -179,7 +178,7 @@ def lpv_outputs(
     block = tables.output_cells.shape[3]
     acting = inputs if auxiliary_act(tables, u) else roles.auxiliary
     block -= (inputs - acting) * rows
-    model = work[W_BLEND : W_BLEND + max(block, states + inputs)]
+    model = work[WORK.size : WORK.size + max(block, states + inputs)]
     blend(tables.cells, i, j, states + inputs, work, model)
     deviation = work[scratch_at(tables) :]
     for k in range(states):
@@ -226,9 +225,9 @@ def lpv_step(
     acceleration = roles.nacelle_acceleration
     of_inputs, block = _acting(tables, u)
     scratch = scratch_at(tables)
-    model = work[W_BLEND : W_BLEND + block]
-    reference = work[W_BLEND : W_BLEND + states + inputs]
-    columns = work[W_BLEND + states + inputs : W_BLEND + block]
+    model = work[WORK.size : WORK.size + block]
+    reference = work[WORK.size : WORK.size + states + inputs]
+    columns = work[WORK.size + states + inputs : WORK.size + block]
     row_sums = work[rows_at(tables) : scratch]
     stage_x = work[scratch : scratch + states]
     slope = work[scratch + states : scratch + 2 * states]
@@ -240,7 +239,7 @@ def lpv_step(
     for k in range(states):
         stage_x[k] = x[k]
         total[k] = 0.0
-    work[W_FLAGS] = 0.0
+    work[WORK.flags] = 0.0
     if refresh == REFRESH_ONCE:
         i, j = locate(tables, x, u, nacelle_path[1, 0], work)
         blend(tables.cells, i, j, block, work, model)
@@ -304,4 +303,4 @@ def lpv_step_steady(
         path[row, 1] = nacelle_rate + t * nacelle_acceleration
         path[row, 2] = nacelle_acceleration
     lpv_step(stepping.tables, x, u, path, dt, stepping.work)
-    return float(stepping.work[W_FLAGS])
+    return float(stepping.work[WORK.flags])

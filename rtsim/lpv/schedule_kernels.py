@@ -15,6 +15,7 @@ from rtsim.arrays import FloatArray, IntArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.packed import Size
+from rtsim.places import Places
 
 FORM_PLAIN = 0
 """The paper's form: linear models interpolated in airspeed and nacelle angle."""
@@ -44,13 +45,15 @@ GAP_NONE = math.radians(1.0)
 GAP_FULL = math.radians(2.0)
 """From this difference on they are blended in full; between the two the blend fades in [rad]."""
 
-# positions in the work array; the sections after the last are laid out by `work_size`
-W_FLAGS = 0
-W_ALPHA = 1
-W_CORNER = 2
-W_LAYER_SHARE = 6
-W_MAX_LAYERS = 8
-W_BLEND = W_LAYER_SHARE + W_MAX_LAYERS
+MAX_LAYERS = 8
+"""Layers a database can have."""
+WORK = Places(
+    "flags",
+    "alpha",
+    ("corner", 4),  # weights of the cell's corners
+    ("layer_share", MAX_LAYERS),
+)
+"""Places in the work array; the sections after the last are laid out by ``work_size``."""
 
 
 class LpvRoles(NamedTuple):
@@ -123,7 +126,7 @@ def rows_at(tables: LpvTables) -> int:
     Returns:
         The position.
     """
-    return int(W_BLEND + max(tables.cells.shape[3], tables.output_cells.shape[3]))
+    return int(WORK.size + max(tables.cells.shape[3], tables.output_cells.shape[3]))
 
 
 @inner_kernel
@@ -223,7 +226,7 @@ def locate(
     sine = math.sin(pitch)
     cosine = math.cos(pitch)
     airspeed = u * cosine + w * sine
-    flags = int(work[W_FLAGS])
+    flags = int(work[WORK.flags])
 
     last_v = tables.airspeed.shape[0] - 1
     last_n = tables.nacelle.shape[0] - 1
@@ -244,10 +247,10 @@ def locate(
     w01 = (1.0 - s) * t
     w10 = s * (1.0 - t)
     w11 = s * t
-    work[W_CORNER] = w00
-    work[W_CORNER + 1] = w01
-    work[W_CORNER + 2] = w10
-    work[W_CORNER + 3] = w11
+    work[WORK.corner] = w00
+    work[WORK.corner + 1] = w01
+    work[WORK.corner + 2] = w10
+    work[WORK.corner + 3] = w11
     covered = (
         w00 * tables.valid[i, j]
         + w01 * tables.valid[i, j + 1]
@@ -256,17 +259,17 @@ def locate(
     )
     if covered < 1.0 - 1e-9:
         flags |= FLAG_NO_TRIM
-    work[W_FLAGS] = flags
+    work[WORK.flags] = flags
 
     layers = tables.alpha.shape[2]
     level = roles.level
     for layer in range(layers):
-        work[W_LAYER_SHARE + layer] = 0.0
+        work[WORK.layer_share + layer] = 0.0
     if layers == 1:
-        work[W_LAYER_SHARE] = 1.0
+        work[WORK.layer_share] = 1.0
         return i, j
     alpha = scheduling_alpha(u, w, sine, cosine, tables.alpha_speed)
-    work[W_ALPHA] = alpha
+    work[WORK.alpha] = alpha
     # Walk outwards from the level layer. `gone` is the share that has left the layer before; the decelerating side
     # gets its part of what the accelerating side left, so that the shares always add up to one.
     rest = 1.0
@@ -281,23 +284,23 @@ def locate(
             if layer == level:
                 rest -= further
             else:
-                work[W_LAYER_SHARE + layer] = gone - further
+                work[WORK.layer_share + layer] = gone - further
             layer += direction
             gone = further
             here = beyond
         if layer != level:
-            work[W_LAYER_SHARE + layer] = gone
-    work[W_LAYER_SHARE + level] = rest
+            work[WORK.layer_share + layer] = gone
+    work[WORK.layer_share + level] = rest
     return i, j
 
 
 @inner_kernel
 def _corner_alpha(tables: LpvTables, i: int, j: int, layer: int, work: FloatArray) -> float:
     return float(
-        work[W_CORNER] * tables.alpha[i, j, layer]
-        + work[W_CORNER + 1] * tables.alpha[i, j + 1, layer]
-        + work[W_CORNER + 2] * tables.alpha[i + 1, j, layer]
-        + work[W_CORNER + 3] * tables.alpha[i + 1, j + 1, layer]
+        work[WORK.corner] * tables.alpha[i, j, layer]
+        + work[WORK.corner + 1] * tables.alpha[i, j + 1, layer]
+        + work[WORK.corner + 2] * tables.alpha[i + 1, j, layer]
+        + work[WORK.corner + 3] * tables.alpha[i + 1, j + 1, layer]
     )
 
 
@@ -315,13 +318,13 @@ def blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, targe
     """
     fresh = True
     for layer in range(cells.shape[2]):
-        share = work[W_LAYER_SHARE + layer]
+        share = work[WORK.layer_share + layer]
         if share == 0.0:
             continue
-        w0 = share * work[W_CORNER]
-        w1 = share * work[W_CORNER + 1]
-        w2 = share * work[W_CORNER + 2]
-        w3 = share * work[W_CORNER + 3]
+        w0 = share * work[WORK.corner]
+        w1 = share * work[WORK.corner + 1]
+        w2 = share * work[WORK.corner + 2]
+        w3 = share * work[WORK.corner + 3]
         c0 = cells[i, j, layer]
         c1 = cells[i, j + 1, layer]
         c2 = cells[i + 1, j, layer]

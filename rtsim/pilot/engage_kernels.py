@@ -11,12 +11,7 @@ from rtsim.pilot.layout_kernels import (
     DISPLAY,
     INTEGRALS,
     LOOP_INTEGRATORS,
-    N_KI_H,
-    N_KI_V,
-    N_KP_H,
-    N_KP_V,
-    N_Z_H,
-    N_Z_V,
+    NUMBER,
     OFFSETS,
     PLANT,
     REF_AIRSPEED,
@@ -151,10 +146,10 @@ def _start_integrals(
             m[hand, 0] = -cell[roles.l + hands * (n - 2) + hand]
             m[hand, 1] = -cell[roles.l + hands * (n - 1) + hand]
         else:
-            m[hand, 0] = outer_command(tables, cell, trim, airspeed, -numbers[N_KI_V], 0.0, hand)
-            m[hand, 1] = outer_command(tables, cell, trim, airspeed, 0.0, -numbers[N_KI_H], hand)
+            m[hand, 0] = outer_command(tables, cell, trim, airspeed, -numbers[NUMBER.ki_v], 0.0, hand)
+            m[hand, 1] = outer_command(tables, cell, trim, airspeed, 0.0, -numbers[NUMBER.ki_h], hand)
             missing[hand] -= outer_command(
-                tables, cell, trim, airspeed, -numbers[N_KP_V] * errors[0], -numbers[N_KP_H] * errors[1], hand
+                tables, cell, trim, airspeed, -numbers[NUMBER.kp_v] * errors[0], -numbers[NUMBER.kp_h] * errors[1], hand
             )
     determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
     size = (abs(m[0, 0]) + abs(m[1, 0])) * (abs(m[0, 1]) + abs(m[1, 1]))
@@ -162,8 +157,8 @@ def _start_integrals(
         return
     z_v = (missing[0] * m[1, 1] - missing[1] * m[0, 1]) / determinant
     z_h = (m[0, 0] * missing[1] - m[1, 0] * missing[0]) / determinant
-    state[integrals_at] = clip(z_v, numbers[N_Z_V])
-    state[integrals_at + 1] = clip(z_h, numbers[N_Z_H])
+    state[integrals_at] = clip(z_v, numbers[NUMBER.z_v])
+    state[integrals_at + 1] = clip(z_h, numbers[NUMBER.z_h])
     if inner:
         state[S_ESTIMATE + n - 2] = state[integrals_at]
         state[S_ESTIMATE + n - 1] = state[integrals_at + 1]

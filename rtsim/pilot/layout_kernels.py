@@ -35,19 +35,20 @@ LOOP_INTEGRATORS = 0
 LOOP_PI = 1
 """Airspeed and altitude held by outer PI loops that move the state reference (the paper's structure)."""
 
-# positions in PilotTables.numbers
-N_GUST_LEAST = 0
-N_FILTER = 1
-N_ACCELERATION_LIMIT = 2
-N_CLIMB_SPEED = 3
-N_KP_V = 4
-N_KI_V = 5
-N_KP_H = 6
-N_KI_H = 7
-N_Z_V = 8
-N_Z_H = 9
-N_DT = 10
-N_COUNT = 11
+NUMBER = Places(
+    "gust_least",
+    "filter",
+    "acceleration_limit",
+    "climb_speed",
+    "kp_v",
+    "ki_v",
+    "kp_h",
+    "ki_h",
+    "z_v",
+    "z_h",
+    "dt",
+)
+"""Places in ``PilotTables.numbers``."""
 
 PLANT = Places(*RIGID_BODY_STATES)
 """Places of the rigid body among the design plant's states."""
@@ -211,12 +212,12 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
     """
     count = 1 + tables.roles.hands
     bilinear(tables, tables.trim, reference[REF_AIRSPEED], nacelle_angle, 4 * count, out)
-    limit = tables.numbers[N_ACCELERATION_LIMIT]
+    limit = tables.numbers[NUMBER.acceleration_limit]
     a = min(limit, max(-limit, reference[REF_AIRSPEED_RATE]))
     for k in range(count):
         out[k] += a * (out[count + k] + a * out[2 * count + k])
     # climbing keeps the angle of attack: pitch rises by the path angle, which fades out towards hover
-    climb_speed = tables.numbers[N_CLIMB_SPEED]
+    climb_speed = tables.numbers[NUMBER.climb_speed]
     speed = reference[REF_AIRSPEED]
     out[0] += reference[REF_CLIMB] * speed / (speed * speed + climb_speed * climb_speed)
 

@@ -46,11 +46,7 @@ from rtsim.pilot.layout_kernels import (
     LARGEST_AIRSPEED_ERROR,
     LARGEST_ALTITUDE_ERROR,
     LOOP_INTEGRATORS,
-    N_FILTER,
-    N_KI_H,
-    N_KI_V,
-    N_KP_H,
-    N_KP_V,
+    NUMBER,
     OFFSETS,
     PLANT,
     REF_AIRSPEED,
@@ -173,8 +169,8 @@ def _outer_loops(
             held.displays[roles.displays - INTEGRALS + k] = integrals[k]
         return
     numbers = tables.numbers
-    dv = -numbers[N_KP_V] * held.displays[DISPLAY.airspeed] - numbers[N_KI_V] * integrals[0]
-    dh = -numbers[N_KP_H] * held.displays[DISPLAY.altitude] - numbers[N_KI_H] * integrals[1]
+    dv = -numbers[NUMBER.kp_v] * held.displays[DISPLAY.airspeed] - numbers[NUMBER.ki_v] * integrals[0]
+    dh = -numbers[NUMBER.kp_h] * held.displays[DISPLAY.altitude] - numbers[NUMBER.ki_h] * integrals[1]
     for hand in range(roles.hands):
         held.command[hand] = outer_command(tables, cell, trim, own[REF_AIRSPEED], dv, dh, hand)
 
@@ -344,5 +340,5 @@ def mocm_advance_in(
     _capture(state, offset_at + 2, (CAPTURE_CLIMB, CAPTURE_CLIMB_RATE), dt)
     state[offset_at] += error_v - clip(error_v, LARGEST_AIRSPEED_ERROR)
     state[offset_at + 2] += error_h - clip(error_h, LARGEST_ALTITUDE_ERROR)
-    state[S_FILTERED] += tables.numbers[N_FILTER] * (airspeed - state[S_FILTERED])
+    state[S_FILTERED] += tables.numbers[NUMBER.filter] * (airspeed - state[S_FILTERED])
     state[S_LIMITED] = 1.0 if frozen else 0.0

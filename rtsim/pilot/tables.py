@@ -117,18 +117,18 @@ def _tables(database: Database, pilot: ScheduledPilot, dt: float) -> PilotTables
 
 def _numbers(pilot: ScheduledPilot, database: Database, dt: float) -> FloatArray:
     settings = {key: value for key, value in pilot.attributes.items() if not isinstance(value, str)}
-    numbers = np.zeros(kernels.N_COUNT)
-    numbers[kernels.N_FILTER] = -np.expm1(-dt / settings["schedule_time"])
-    numbers[kernels.N_ACCELERATION_LIMIT] = ACCELERATION_REACH * float(np.max(np.abs(database.layer_acceleration)))
-    numbers[kernels.N_CLIMB_SPEED] = CLIMB_SPEED
-    numbers[kernels.N_KP_V] = settings["airspeed_proportional"]
-    numbers[kernels.N_KI_V] = settings["airspeed_integral"]
-    numbers[kernels.N_KP_H] = settings["altitude_proportional"]
-    numbers[kernels.N_KI_H] = settings["altitude_integral"]
+    numbers = np.zeros(kernels.NUMBER.size)
+    numbers[kernels.NUMBER.filter] = -np.expm1(-dt / settings["schedule_time"])
+    numbers[kernels.NUMBER.acceleration_limit] = ACCELERATION_REACH * float(np.max(np.abs(database.layer_acceleration)))
+    numbers[kernels.NUMBER.climb_speed] = CLIMB_SPEED
+    numbers[kernels.NUMBER.kp_v] = settings["airspeed_proportional"]
+    numbers[kernels.NUMBER.ki_v] = settings["airspeed_integral"]
+    numbers[kernels.NUMBER.kp_h] = settings["altitude_proportional"]
+    numbers[kernels.NUMBER.ki_h] = settings["altitude_integral"]
     reach = INTEGRAL_REACH * settings["integral_time"]
-    numbers[kernels.N_Z_V] = reach * settings["airspeed_maximum"]
-    numbers[kernels.N_Z_H] = reach * settings["altitude_maximum"]
-    numbers[kernels.N_DT] = dt
+    numbers[kernels.NUMBER.z_v] = reach * settings["airspeed_maximum"]
+    numbers[kernels.NUMBER.z_h] = reach * settings["altitude_maximum"]
+    numbers[kernels.NUMBER.dt] = dt
     return numbers
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rtsim.protection.prediction_kernels import CELL_SIZE, ROLL_OUT_SIZE, BoundaryTables, ModelTables
+from rtsim.places import Places
+from rtsim.protection.prediction_kernels import CELL, OUT, BoundaryTables, ModelTables
 
 LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
 
@@ -12,31 +13,52 @@ LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
 REASON_NONE, REASON_LOW, REASON_HIGH, REASON_GATE = 0, 1, 2, 3
 REASON_FLAP, REASON_TORQUE, REASON_PITCH, REASON_SINK = 6, 7, 9, 11
 
-# Places in the law's state: what is allowed now ...
-L_BLEND, L_STICK, L_LEVER = 0, 1, 2
-L_STICK_LOW, L_STICK_HIGH, L_LEVER_LOW, L_LEVER_HIGH, L_RATE_LOW, L_RATE_HIGH = 3, 4, 5, 6, 7, 8
-L_BLEND_REASON, L_STICK_LOW_REASON, L_STICK_HIGH_REASON, L_LEVER_REASON, L_RATE_REASON = 9, 10, 11, 12, 13
-L_TIME, L_SIDE = 14, 15
-"""Time to the corridor's boundary with the controls as they are [s], and its side (-1 low, 1 high, 0 none)."""
-L_MARGIN = 16
-"""Least margin predicted with the pilot's controls [m/s]."""
+LAW = Places(
+    "blend",  # what is allowed now ...
+    "stick",
+    "lever",
+    "stick_low",
+    "stick_high",
+    "lever_low",
+    "lever_high",
+    "rate_low",
+    "rate_high",
+    "blend_reason",
+    "stick_low_reason",
+    "stick_high_reason",
+    "lever_reason",
+    "rate_reason",
+    "time",  # time to the corridor's boundary with the controls as they are [s]
+    "side",  # its side: -1 low, 1 high, 0 none
+    "margin",  # least margin predicted with the pilot's controls [m/s]
+    "acted",  # ... what acted last, set by law_apply ...
+    "acted_stick",
+    "acted_lever",
+    "acted_rate",
+    "stick_cause",  # reason for the change of each channel in this frame; 0 where there was none
+    "lever_cause",
+    "rate_cause",
+    "started",  # ... and memory from one decision to the next
+    "bias",
+    "last_nacelle_rate",
+    "last_torque",
+    "torque_rate",
+    "collective",
+    "flap_bias",
+    "recover_side",
+    "override",  # 1: the pilot has switched the law's authority off
+    "kind",  # how the nacelle rate was limited: 0 limit, 1 reverse
+)
+"""Places in the law's state."""
 # ... what acted last, set by law_apply ...
-L_ACTED, L_ACTED_STICK, L_ACTED_LEVER, L_ACTED_RATE = 17, 18, 19, 20
-L_STICK_CAUSE, L_LEVER_CAUSE, L_RATE_CAUSE = 21, 22, 23
-"""Reason for the change of each channel in this frame; 0 where there was none."""
 # ... and memory from one decision to the next.
-L_STARTED, L_BIAS, L_LAST_NACELLE_RATE, L_LAST_TORQUE, L_TORQUE_RATE, L_COLLECTIVE = 24, 25, 26, 27, 28, 29
-L_FLAP_BIAS, L_RECOVER_SIDE, L_OVERRIDE, L_KIND = 30, 31, 32, 33
-"""L_OVERRIDE 1: the pilot has switched the law's authority off. L_KIND: how the nacelle rate was limited (0 limit,
-1 reverse)."""
-LAW_STATE_SIZE = 34
 
 FREE = 1e9
 """A bound that bounds nothing."""
 CHANGE_STICK, CHANGE_LEVER, CHANGE_RATE = 1e-4, 1e-4, 1e-5
 """Changes smaller than these are rounding, not interventions [-, -, rad/s]."""
 
-WORK_SIZE = 2 * CELL_SIZE + ROLL_OUT_SIZE
+WORK_SIZE = 2 * CELL.size + OUT.size
 """Length of the scratch array of the laws."""
 
 

@@ -19,36 +19,7 @@ from rtsim.protection.law_data import (
     CHANGE_RATE,
     CHANGE_STICK,
     FREE,
-    L_ACTED,
-    L_ACTED_LEVER,
-    L_ACTED_RATE,
-    L_ACTED_STICK,
-    L_BIAS,
-    L_BLEND,
-    L_BLEND_REASON,
-    L_COLLECTIVE,
-    L_LAST_NACELLE_RATE,
-    L_LAST_TORQUE,
-    L_LEVER,
-    L_LEVER_CAUSE,
-    L_LEVER_HIGH,
-    L_LEVER_LOW,
-    L_LEVER_REASON,
-    L_MARGIN,
-    L_OVERRIDE,
-    L_RATE_CAUSE,
-    L_RATE_HIGH,
-    L_RATE_LOW,
-    L_RATE_REASON,
-    L_SIDE,
-    L_STARTED,
-    L_STICK,
-    L_STICK_CAUSE,
-    L_STICK_HIGH,
-    L_STICK_HIGH_REASON,
-    L_STICK_LOW,
-    L_STICK_LOW_REASON,
-    L_TIME,
+    LAW,
     LAW_FULL,
     LAW_GOVERNOR,
     LAW_OFF,
@@ -67,10 +38,10 @@ def law_release(state: FloatArray) -> None:
     Args:
         state: Law state, updated in place.
     """
-    state[L_BLEND] = 0.0
-    state[L_STICK_LOW], state[L_STICK_HIGH] = -FREE, FREE
-    state[L_LEVER_LOW], state[L_LEVER_HIGH] = -FREE, FREE
-    state[L_RATE_LOW], state[L_RATE_HIGH] = -FREE, FREE
+    state[LAW.blend] = 0.0
+    state[LAW.stick_low], state[LAW.stick_high] = -FREE, FREE
+    state[LAW.lever_low], state[LAW.lever_high] = -FREE, FREE
+    state[LAW.rate_low], state[LAW.rate_high] = -FREE, FREE
 
 
 @inner_kernel
@@ -81,8 +52,8 @@ def law_start(tables: ProtectionTables, state: FloatArray) -> None:
         state: Law state, overwritten.
     """
     state[:] = 0.0
-    state[L_TIME] = tables.settings.warning_horizon
-    state[L_MARGIN] = FREE
+    state[LAW.time] = tables.settings.warning_horizon
+    state[LAW.margin] = FREE
     law_release(state)
 
 
@@ -93,9 +64,9 @@ def law_release_unblended(state: FloatArray) -> None:
     Args:
         state: Law state, updated in place.
     """
-    blend = state[L_BLEND]
+    blend = state[LAW.blend]
     law_release(state)
-    state[L_BLEND] = blend
+    state[LAW.blend] = blend
 
 
 @inner_kernel
@@ -119,51 +90,51 @@ def _look_ahead(
     if not (_finite(sensors) and _finite(command)):
         # A law that cannot see does not act.
         law_release(state)
-        state[L_STARTED] = 0.0
-        state[L_TIME], state[L_SIDE] = settings.warning_horizon, 0.0
+        state[LAW.started] = 0.0
+        state[LAW.time], state[LAW.side] = settings.warning_horizon, 0.0
         return False, (0.0, 0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)
-    cell = work[: model.CELL_SIZE]
-    out = work[2 * model.CELL_SIZE : 2 * model.CELL_SIZE + model.ROLL_OUT_SIZE]
+    cell = work[: model.CELL.size]
+    out = work[2 * model.CELL.size : 2 * model.CELL.size + model.OUT.size]
     dt = settings.period
     airspeed, angle, rate = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], sensors[SENSOR.nacelle_rate]
     pitch, climb = sensors[SENSOR.pitch], sensors[SENSOR.climb_rate]
     sine, cosine = math.sin(pitch), math.cos(pitch)
     z = (airspeed * cosine + climb * sine, airspeed * sine - climb * cosine, sensors[SENSOR.pitch_rate], pitch)
     asked = (clip(command[0], -1.0, 1.0), clip(command[1], 0.0, 1.0))
-    if state[L_STARTED] == 0.0:
-        state[L_ACTED_STICK], state[L_ACTED_LEVER], state[L_ACTED_RATE] = asked[0], asked[1], 0.0
-        state[L_COLLECTIVE] = asked[1]
-        state[L_LAST_NACELLE_RATE] = rate
-    acting = (state[L_ACTED_STICK], state[L_ACTED_LEVER])
+    if state[LAW.started] == 0.0:
+        state[LAW.acted_stick], state[LAW.acted_lever], state[LAW.acted_rate] = asked[0], asked[1], 0.0
+        state[LAW.collective] = asked[1]
+        state[LAW.last_nacelle_rate] = rate
+    acting = (state[LAW.acted_stick], state[LAW.acted_lever])
     model_at(tables.model, airspeed, angle, cell)
 
     _, _, _, expected, _ = accelerations(cell, z, acting, (0.0, rate))
     missing = clip(sensors[SENSOR.airspeed_rate] - expected, -settings.bias_limit, settings.bias_limit)
-    state[L_BIAS] += dt / settings.bias_filter * (missing - state[L_BIAS])
-    bias = (state[L_BIAS], settings.bias_decay)
+    state[LAW.bias] += dt / settings.bias_filter * (missing - state[LAW.bias])
+    bias = (state[LAW.bias], settings.bias_decay)
     # The filter's command angle follows from its motion: n'' = w^2 (c - n) - 2 w n'.
     w = tables.model.nacelle_frequency
-    turning = (rate - state[L_LAST_NACELLE_RATE]) / dt
-    state[L_LAST_NACELLE_RATE] = rate
+    turning = (rate - state[LAW.last_nacelle_rate]) / dt
+    state[LAW.last_nacelle_rate] = rate
     commanded = clip(angle + (2.0 * rate + turning / w) / w, tables.model.forward_stop, tables.model.aft_stop)
     nacelle = (commanded, angle, rate)
     if sensors[SENSOR.nacelle_ok] == 0.0:
         nacelle = (angle, angle, 0.0)
 
     horizon = settings.warning_horizon
-    held = state[L_ACTED_RATE] if sensors[SENSOR.nacelle_ok] != 0.0 else 0.0
+    held = state[LAW.acted_rate] if sensors[SENSOR.nacelle_ok] != 0.0 else 0.0
     time, guard = (settings.warning_step, horizon), (settings.pitch, settings.pitch_frequency)
     roll_out(tables.model, tables.corridor, cell, z, acting, nacelle, (held, horizon), bias, time, guard, out)
-    state[L_TIME], state[L_SIDE] = out[model.OUT_TIME], out[model.OUT_SIDE]
-    state[L_MARGIN] = min(out[model.OUT_LOW], out[model.OUT_HIGH])
+    state[LAW.time], state[LAW.side] = out[model.OUT.time], out[model.OUT.side]
+    state[LAW.margin] = min(out[model.OUT.low], out[model.OUT.high])
     law_release_unblended(state)
     return True, z, asked, nacelle
 
 
 @inner_kernel
 def _remember(state: FloatArray, sensors: FloatArray) -> None:
-    state[L_LAST_TORQUE] = sensors[SENSOR.mast_torque]
-    state[L_STARTED] = 1.0
+    state[LAW.last_torque] = sensors[SENSOR.mast_torque]
+    state[LAW.started] = 1.0
 
 
 @inner_kernel
@@ -196,9 +167,9 @@ def law_decide(
     seen, z, asked, nacelle = _look_ahead(tables, state, sensors, command, work)
     if not seen:
         return
-    cell, target = work[: model.CELL_SIZE], work[model.CELL_SIZE : 2 * model.CELL_SIZE]
-    out = work[2 * model.CELL_SIZE : 2 * model.CELL_SIZE + model.ROLL_OUT_SIZE]
-    acting = (state[L_ACTED_STICK], state[L_ACTED_LEVER])
+    cell, target = work[: model.CELL.size], work[model.CELL.size : 2 * model.CELL.size]
+    out = work[2 * model.CELL.size : 2 * model.CELL.size + model.OUT.size]
+    acting = (state[LAW.acted_stick], state[LAW.acted_lever])
     airspeed, angle, rate = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], sensors[SENSOR.nacelle_rate]
     if tables.law == LAW_GOVERNOR:
         govern(tables, state, cell, z, (asked, asked), nacelle, command[2], out)
@@ -224,45 +195,45 @@ def law_apply(tables: ProtectionTables, state: FloatArray, command: FloatArray, 
     stick, lever, rate = command[0], command[1], command[2]
     # A command that is no number is answered with what acted last.
     if not math.isfinite(stick):
-        stick = state[L_ACTED_STICK]
+        stick = state[LAW.acted_stick]
     if not math.isfinite(lever):
-        lever = state[L_ACTED_LEVER]
+        lever = state[LAW.acted_lever]
     if not math.isfinite(rate):
         rate = 0.0
     applied[0], applied[1], applied[2] = stick, lever, rate
-    state[L_STICK_CAUSE], state[L_LEVER_CAUSE], state[L_RATE_CAUSE] = 0.0, 0.0, 0.0
-    if tables.law >= LAW_GOVERNOR and state[L_OVERRIDE] == 0.0:
-        applied[2] = clip(rate, state[L_RATE_LOW], state[L_RATE_HIGH])
+    state[LAW.stick_cause], state[LAW.lever_cause], state[LAW.rate_cause] = 0.0, 0.0, 0.0
+    if tables.law >= LAW_GOVERNOR and state[LAW.override] == 0.0:
+        applied[2] = clip(rate, state[LAW.rate_low], state[LAW.rate_high])
         if abs(applied[2] - rate) > CHANGE_RATE:
-            state[L_RATE_CAUSE] = state[L_RATE_REASON]
+            state[LAW.rate_cause] = state[LAW.rate_reason]
         if tables.law == LAW_FULL:
             _apply_hands(state, stick, lever, applied)
-    state[L_ACTED] = 1.0
-    state[L_ACTED_STICK] = clip(applied[0], -1.0, 1.0)
-    state[L_ACTED_LEVER] = clip(applied[1], 0.0, 1.0)
-    state[L_ACTED_RATE] = applied[2]
+    state[LAW.acted] = 1.0
+    state[LAW.acted_stick] = clip(applied[0], -1.0, 1.0)
+    state[LAW.acted_lever] = clip(applied[1], 0.0, 1.0)
+    state[LAW.acted_rate] = applied[2]
 
 
 @inner_kernel
 def _apply_hands(state: FloatArray, stick: float, lever: float, applied: FloatArray) -> None:
-    blend = state[L_BLEND]
+    blend = state[LAW.blend]
     if blend > 0.0:
-        applied[0] = stick + blend * (state[L_STICK] - stick)
-        applied[1] = lever + blend * (state[L_LEVER] - lever)
+        applied[0] = stick + blend * (state[LAW.stick] - stick)
+        applied[1] = lever + blend * (state[LAW.lever] - lever)
         if abs(applied[0] - stick) > CHANGE_STICK:
-            state[L_STICK_CAUSE] = state[L_BLEND_REASON]
+            state[LAW.stick_cause] = state[LAW.blend_reason]
         if abs(applied[1] - lever) > CHANGE_LEVER:
-            state[L_LEVER_CAUSE] = state[L_BLEND_REASON]
+            state[LAW.lever_cause] = state[LAW.blend_reason]
     before = applied[0]
-    applied[0] = clip(before, state[L_STICK_LOW], state[L_STICK_HIGH])
+    applied[0] = clip(before, state[LAW.stick_low], state[LAW.stick_high])
     if applied[0] > before + CHANGE_STICK:
-        state[L_STICK_CAUSE] = state[L_STICK_LOW_REASON]
+        state[LAW.stick_cause] = state[LAW.stick_low_reason]
     elif applied[0] < before - CHANGE_STICK:
-        state[L_STICK_CAUSE] = state[L_STICK_HIGH_REASON]
+        state[LAW.stick_cause] = state[LAW.stick_high_reason]
     before = applied[1]
-    applied[1] = clip(before, state[L_LEVER_LOW], state[L_LEVER_HIGH])
+    applied[1] = clip(before, state[LAW.lever_low], state[LAW.lever_high])
     if abs(applied[1] - before) > CHANGE_LEVER:
-        state[L_LEVER_CAUSE] = state[L_LEVER_REASON]
+        state[LAW.lever_cause] = state[LAW.lever_reason]
 
 
 @inner_kernel
@@ -272,7 +243,7 @@ def law_due(tables: ProtectionTables, state: FloatArray, frame: int) -> bool:
     Args:
         frame: Number of the frame.
     """
-    return tables.law != LAW_OFF and (frame % tables.every == 0 or state[L_STARTED] == 0.0)
+    return tables.law != LAW_OFF and (frame % tables.every == 0 or state[LAW.started] == 0.0)
 
 
 @inner_kernel

@@ -66,7 +66,7 @@ class BuiltInLaw:
         self._tables = law_tables(law, self._database, dt=0.02, boundary=boundary, settings=settings)
         self._dt = 0.02
         self._frame = 0
-        self._state = np.zeros(data.LAW_STATE_SIZE)
+        self._state = np.zeros(data.LAW.size)
         self._work = np.zeros(data.WORK_SIZE)
         self._applied = np.zeros(3)
         law_kernels.law_start(self._tables, self._state)
@@ -85,7 +85,7 @@ class BuiltInLaw:
     @property
     def time_to_limit(self) -> float:
         """Predicted time until the corridor is left with the controls as they are; infinite where it is not [s]."""
-        return float(self._state[data.L_TIME]) if self._state[data.L_SIDE] != 0.0 else math.inf
+        return float(self._state[data.LAW.time]) if self._state[data.LAW.side] != 0.0 else math.inf
 
     def step(
         self, sensors: Sensors, command: Command, margins: Margins, dt: float
@@ -115,14 +115,14 @@ class BuiltInLaw:
         if self._tables.law == data.LAW_MONITOR:
             return self._warnings(asked)
         found = []
-        causes = (data.L_STICK_CAUSE, data.L_LEVER_CAUSE, data.L_RATE_CAUSE)
+        causes = (data.LAW.stick_cause, data.LAW.lever_cause, data.LAW.rate_cause)
         for place, (channel, cause) in enumerate(zip(CHANNELS, causes, strict=True)):
             reason = int(state[cause])
             if reason == data.REASON_NONE:
                 continue
             kind: Literal["limit", "reverse", "blend", "clip"] = "clip" if reason in _CLIPS else "blend"
             if channel == "nacelle_rate":
-                kind = "reverse" if state[data.L_KIND] != 0.0 else "limit"
+                kind = "reverse" if state[data.LAW.kind] != 0.0 else "limit"
             found.append(
                 Intervention(
                     limit=LIMIT_KINDS[reason - 1],
@@ -142,8 +142,8 @@ class BuiltInLaw:
         if ahead >= _WARNING_TIME:
             return []
         rate = float(asked[2])
-        reason = data.REASON_LOW if self._state[data.L_SIDE] < 0.0 else data.REASON_HIGH
-        margin = float(self._state[data.L_MARGIN])
+        reason = data.REASON_LOW if self._state[data.LAW.side] < 0.0 else data.REASON_HIGH
+        margin = float(self._state[data.LAW.margin])
         return [Intervention(LIMIT_KINDS[reason - 1], "nacelle_rate", "warn", rate, rate, margin, ahead)]
 
     def _margin(self, reason: int, sensors: Sensors) -> float:
@@ -160,7 +160,7 @@ class BuiltInLaw:
             return float(
                 limiter_kernels.allowed_sink(limits.sink, sensors.airspeed, sensors.altitude) + sensors.climb_rate
             )
-        return float(self._state[data.L_MARGIN])
+        return float(self._state[data.LAW.margin])
 
 
 @dataclass(frozen=True, slots=True)

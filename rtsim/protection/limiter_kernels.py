@@ -12,29 +12,7 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import (
     FREE,
-    L_ACTED_LEVER,
-    L_BIAS,
-    L_BLEND,
-    L_BLEND_REASON,
-    L_COLLECTIVE,
-    L_FLAP_BIAS,
-    L_KIND,
-    L_LAST_TORQUE,
-    L_LEVER,
-    L_LEVER_HIGH,
-    L_LEVER_REASON,
-    L_MARGIN,
-    L_RATE_HIGH,
-    L_RATE_LOW,
-    L_RATE_REASON,
-    L_RECOVER_SIDE,
-    L_STARTED,
-    L_STICK,
-    L_STICK_HIGH,
-    L_STICK_HIGH_REASON,
-    L_STICK_LOW,
-    L_STICK_LOW_REASON,
-    L_TORQUE_RATE,
+    LAW,
     REASON_FLAP,
     REASON_GATE,
     REASON_HIGH,
@@ -100,23 +78,23 @@ def govern(
         out: Scratch of ROLL_OUT_SIZE numbers.
     """
     settings = tables.settings
-    bias = (state[L_BIAS], settings.bias_decay)
+    bias = (state[LAW.bias], settings.bias_decay)
     time = (settings.step, settings.horizon)
     guard = (settings.pitch, settings.pitch_frequency)
     acting, asked = controls
-    state[L_RATE_LOW], state[L_RATE_HIGH] = -FREE, FREE
-    state[L_KIND] = 0.0
+    state[LAW.rate_low], state[LAW.rate_high] = -FREE, FREE
+    state[LAW.kind] = 0.0
     roll_out(tables.model, tables.corridor, cell, z, acting, nacelle, (0.0, 0.0), bias, time, guard, out)
-    stopped = min(out[model.OUT_LOW], out[model.OUT_HIGH])
-    state[L_MARGIN] = stopped
+    stopped = min(out[model.OUT.low], out[model.OUT.high])
+    state[LAW.margin] = stopped
     if stopped < settings.reverse_margin:
-        low_side = out[model.OUT_LOW] < out[model.OUT_HIGH]
-        ends = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
+        low_side = out[model.OUT.low] < out[model.OUT.high]
+        ends = min(out[model.OUT.low_end], out[model.OUT.high_end])
         _turn_back(tables, state, cell, z, acting, nacelle, (low_side, ends), out)
     elif pilot_rate != 0.0:
         if asked != acting:
             roll_out(tables.model, tables.corridor, cell, z, asked, nacelle, (0.0, 0.0), bias, time, guard, out)
-            stopped = min(out[model.OUT_LOW], out[model.OUT_HIGH])
+            stopped = min(out[model.OUT.low], out[model.OUT.high])
         _scale_rate(tables, state, cell, z, asked, nacelle, (pilot_rate, stopped), out)
 
 
@@ -135,30 +113,30 @@ def _turn_back(
     settings = tables.settings
     low_side, ends = stopped
     angle = nacelle[1]
-    state[L_RATE_REASON] = REASON_LOW if low_side else REASON_HIGH
+    state[LAW.rate_reason] = REASON_LOW if low_side else REASON_HIGH
     if not low_side and settings.finish_nacelle < angle <= settings.flat_high_nacelle:
-        state[L_RATE_HIGH] = 0.0
+        state[LAW.rate_high] = 0.0
         return
-    state[L_KIND] = 1.0
+    state[LAW.kind] = 1.0
     back = settings.reverse_rate if low_side else -settings.reverse_rate
     if not low_side and angle <= settings.finish_nacelle:
-        state[L_RATE_HIGH] = back
+        state[LAW.rate_high] = back
         return
-    bias = (state[L_BIAS], settings.bias_decay)
+    bias = (state[LAW.bias], settings.bias_decay)
     time = (settings.step, settings.horizon)
     guard = (settings.pitch, settings.pitch_frequency)
     turning = (back, settings.horizon)
     roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, turning, bias, time, guard, out)
-    turned = min(out[model.OUT_LOW_END], out[model.OUT_HIGH_END])
+    turned = min(out[model.OUT.low_end], out[model.OUT.high_end])
     # Aft is the way out on the low side and forward on the high side even where the nacelles' own pull or drag costs
     # margin at first: only a turn that is seen to suffice may be slower than the fastest.
     share = 1.0
     if turned > settings.reverse_margin and turned > ends:
         share = clip((settings.reverse_margin - ends) / (turned - ends), 0.25, 1.0)
     if low_side:
-        state[L_RATE_LOW] = share * back
+        state[LAW.rate_low] = share * back
     else:
-        state[L_RATE_HIGH] = share * back
+        state[LAW.rate_high] = share * back
 
 
 @inner_kernel
@@ -175,13 +153,13 @@ def _scale_rate(
     """Bound the nacelle rate to the part of what is asked for after which stopping still keeps the margin."""
     settings = tables.settings
     rate, stopped = asked
-    bias = (state[L_BIAS], settings.bias_decay)
+    bias = (state[LAW.bias], settings.bias_decay)
     time = (settings.step, settings.horizon)
     guard = (settings.pitch, settings.pitch_frequency)
     tried = (rate, settings.apply)
     roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, tried, bias, time, guard, out)
-    margin = min(out[model.OUT_LOW], out[model.OUT_HIGH])
-    low_side = out[model.OUT_LOW] < out[model.OUT_HIGH]
+    margin = min(out[model.OUT.low], out[model.OUT.high])
+    low_side = out[model.OUT.low] < out[model.OUT.high]
     if margin >= settings.pass_margin or margin >= stopped:
         return
     share = 0.0
@@ -190,16 +168,16 @@ def _scale_rate(
         share = (stopped - settings.pass_margin) / (stopped - margin)
         tried = (share * rate, settings.apply)
         roll_out(tables.model, tables.corridor, cell, z, controls, nacelle, tried, bias, time, guard, out)
-        if min(out[model.OUT_LOW], out[model.OUT_HIGH]) < settings.pass_margin:
+        if min(out[model.OUT.low], out[model.OUT.high]) < settings.pass_margin:
             share *= 0.5
     gated = nacelle[1] <= tables.corridor.downstop_nacelle and not low_side
     if gated:
         share = 0.0
     if rate < 0.0:
-        state[L_RATE_LOW] = share * rate
+        state[LAW.rate_low] = share * rate
     else:
-        state[L_RATE_HIGH] = share * rate
-    state[L_RATE_REASON] = REASON_LOW if low_side else (REASON_GATE if gated else REASON_HIGH)
+        state[LAW.rate_high] = share * rate
+    state[LAW.rate_reason] = REASON_LOW if low_side else (REASON_GATE if gated else REASON_HIGH)
 
 
 @inner_kernel
@@ -216,31 +194,31 @@ def _recover(
     airspeed, angle, climb = flight
     low, high = speed_range(tables.corridor, angle)
     aim = airspeed
-    if state[L_RECOVER_SIDE] < 0.0:
+    if state[LAW.recover_side] < 0.0:
         aim = max(airspeed, low + settings.recovery_margin)
-        state[L_BLEND_REASON] = REASON_LOW
-    elif state[L_RECOVER_SIDE] == 0.0:
-        state[L_BLEND_REASON] = REASON_SINK
+        state[LAW.blend_reason] = REASON_LOW
+    elif state[LAW.recover_side] == 0.0:
+        state[LAW.blend_reason] = REASON_SINK
     else:
         aim = min(airspeed, high - settings.recovery_margin)
-        state[L_BLEND_REASON] = REASON_HIGH
+        state[LAW.blend_reason] = REASON_HIGH
     step = clip(aim - airspeed, -settings.recovery_step, settings.recovery_step)
     allowed = max(settings.sink_floor, settings.sink_slope * abs(airspeed))
     excess = -climb - allowed
     if step > 0.0 and excess > 0.0:
         # Height is not traded for speed beyond the allowed descent.
         step *= max(0.0, 1.0 - excess / allowed)
-        state[L_BLEND_REASON] = REASON_SINK
+        state[LAW.blend_reason] = REASON_SINK
     model_at(tables.model, airspeed + step, angle, target)
-    d0 = z[0] - target[model.C_STATE]
-    d1 = z[1] - target[model.C_STATE + 1]
-    d2 = z[2] - target[model.C_STATE + 2]
-    d3 = z[3] - target[model.C_STATE + 3]
-    g = model.C_GAIN
-    stick = target[model.C_CONTROL] - (cell[g] * d0 + cell[g + 1] * d1 + cell[g + 2] * d2 + cell[g + 3] * d3)
-    lever = target[model.C_CONTROL + 1] - (cell[g + 4] * d0 + cell[g + 5] * d1 + cell[g + 6] * d2 + cell[g + 7] * d3)
-    state[L_STICK] = clip(stick, -1.0, 1.0)
-    state[L_LEVER] = clip(lever, 0.0, 1.0)
+    d0 = z[0] - target[model.CELL.state]
+    d1 = z[1] - target[model.CELL.state + 1]
+    d2 = z[2] - target[model.CELL.state + 2]
+    d3 = z[3] - target[model.CELL.state + 3]
+    g = model.CELL.gain
+    stick = target[model.CELL.control] - (cell[g] * d0 + cell[g + 1] * d1 + cell[g + 2] * d2 + cell[g + 3] * d3)
+    lever = target[model.CELL.control + 1] - (cell[g + 4] * d0 + cell[g + 5] * d1 + cell[g + 6] * d2 + cell[g + 7] * d3)
+    state[LAW.stick] = clip(stick, -1.0, 1.0)
+    state[LAW.lever] = clip(lever, 0.0, 1.0)
 
 
 @inner_kernel
@@ -269,29 +247,29 @@ def blend_recovery(
     cell, target, out = work
     settings = tables.settings
     dt = settings.period
-    bias = (state[L_BIAS], settings.bias_decay)
-    allowed = clip(pilot_rate, state[L_RATE_LOW], state[L_RATE_HIGH])
+    bias = (state[LAW.bias], settings.bias_decay)
+    allowed = clip(pilot_rate, state[LAW.rate_low], state[LAW.rate_high])
     roll_out(
         tables.model, tables.corridor, cell, z, asked, nacelle, (allowed, settings.apply), bias,
         (settings.step, settings.horizon), (settings.pitch, settings.pitch_frequency), out,
     )  # fmt: skip
-    low, high = out[model.OUT_LOW], out[model.OUT_HIGH]
+    low, high = out[model.OUT.low], out[model.OUT.high]
     margin = min(low, high)
-    state[L_MARGIN] = margin
+    state[LAW.margin] = margin
     wanted = clip((settings.blend_begin - margin) / (settings.blend_begin - settings.blend_full), 0.0, 1.0)
     if wanted > 0.0:
-        state[L_RECOVER_SIDE] = -1.0 if low < high else 1.0
+        state[LAW.recover_side] = -1.0 if low < high else 1.0
     airspeed, _, climb = flight
     sink = allowed_sink(tables.sink, airspeed, altitude)
     sinking = clip((-climb - sink) / (0.3 * sink), 0.0, 1.0)
     if sinking > wanted:
         wanted = sinking
-        if state[L_BLEND] == 0.0 or state[L_RECOVER_SIDE] == 0.0:
-            state[L_RECOVER_SIDE] = 0.0
+        if state[LAW.blend] == 0.0 or state[LAW.recover_side] == 0.0:
+            state[LAW.recover_side] = 0.0
     height = (altitude - settings.height_floor) / (settings.height_full - settings.height_floor)
     wanted = min(wanted, clip(height, 0.0, 1.0))
-    state[L_BLEND] += clip(wanted - state[L_BLEND], -settings.blend_fall * dt, settings.blend_rise * dt)
-    if state[L_BLEND] > 0.0:
+    state[LAW.blend] += clip(wanted - state[LAW.blend], -settings.blend_fall * dt, settings.blend_rise * dt)
+    if state[LAW.blend] > 0.0:
         _recover(tables, state, cell, target, z, flight)
 
 
@@ -318,7 +296,7 @@ def limit_stick(
     settings = tables.settings
     low, high = -FREE, FREE
     low_reason, high_reason = REASON_NONE, REASON_NONE
-    power = cell[model.C_B + 6]
+    power = cell[model.CELL.b + 6]
     if power < -0.2:
         _, _, at_rest, _, _ = accelerations(cell, z, (0.0, controls[1]), (0.0, nacelle_rate))
         f = settings.pitch_frequency
@@ -327,14 +305,14 @@ def limit_stick(
         low, high = (up - at_rest) / power, (down - at_rest) / power
         low_reason, high_reason = REASON_PITCH, REASON_PITCH
 
-    slope_c, slope_s = cell[model.C_FLAP_C + 4], cell[model.C_FLAP_S + 4]
+    slope_c, slope_s = cell[model.CELL.flap_c + 4], cell[model.CELL.flap_s + 4]
     square = slope_c * slope_c + slope_s * slope_s
-    now_c = affine(cell, model.C_FLAP_C, z, controls, nacelle_rate)
-    now_s = affine(cell, model.C_FLAP_S, z, controls, nacelle_rate)
+    now_c = affine(cell, model.CELL.flap_c, z, controls, nacelle_rate)
+    now_s = affine(cell, model.CELL.flap_s, z, controls, nacelle_rate)
     missed = clip(measured_flapping - math.sqrt(now_c * now_c + now_s * now_s), -0.02, 0.05)
-    state[L_FLAP_BIAS] += settings.period / settings.bias_filter * (missed - state[L_FLAP_BIAS])
+    state[LAW.flap_bias] += settings.period / settings.bias_filter * (missed - state[LAW.flap_bias])
     if square > 0.0025:  # 2.9 deg per half travel: less is no means to limit flapping
-        reach = max(settings.flapping - max(state[L_FLAP_BIAS], 0.0), 0.05)
+        reach = max(settings.flapping - max(state[LAW.flap_bias], 0.0), 0.05)
         b_c, b_s = now_c - slope_c * controls[0], now_s - slope_s * controls[0]
         middle = -(b_c * slope_c + b_s * slope_s) / square
         rest = reach * reach - (b_c * b_c + b_s * b_s) + square * middle * middle
@@ -346,8 +324,8 @@ def limit_stick(
         if low > high:
             low, high = middle - half, middle + half
             low_reason, high_reason = REASON_FLAP, REASON_FLAP
-    state[L_STICK_LOW], state[L_STICK_HIGH] = clip(low, -1.0, 1.0), clip(high, -1.0, 1.0)
-    state[L_STICK_LOW_REASON], state[L_STICK_HIGH_REASON] = low_reason, high_reason
+    state[LAW.stick_low], state[LAW.stick_high] = clip(low, -1.0, 1.0), clip(high, -1.0, 1.0)
+    state[LAW.stick_low_reason], state[LAW.stick_high_reason] = low_reason, high_reason
 
 
 @inner_kernel
@@ -364,13 +342,13 @@ def limit_lever(
     """
     settings = tables.settings
     dt = settings.period
-    sensitivity = max(cell[model.C_TORQUE + 5], 1e3)
-    moved = dt / settings.collective_lag * (state[L_ACTED_LEVER] - state[L_COLLECTIVE])
+    sensitivity = max(cell[model.CELL.torque + 5], 1e3)
+    moved = dt / settings.collective_lag * (state[LAW.acted_lever] - state[LAW.collective])
     own = sensitivity * moved / dt
-    rate = (torque - state[L_LAST_TORQUE]) / dt - own if state[L_STARTED] != 0.0 else 0.0
-    state[L_TORQUE_RATE] += 0.2 * (rate - state[L_TORQUE_RATE])
-    state[L_COLLECTIVE] += moved
+    rate = (torque - state[LAW.last_torque]) / dt - own if state[LAW.started] != 0.0 else 0.0
+    state[LAW.torque_rate] += 0.2 * (rate - state[LAW.torque_rate])
+    state[LAW.collective] += moved
     room = settings.torque_share * torque_limit(tables.torque, airspeed, angle) - torque
-    room -= settings.torque_lead * max(state[L_TORQUE_RATE], 0.0)
-    state[L_LEVER_HIGH] = clip(state[L_COLLECTIVE] + room / sensitivity, 0.0, 1.0)
-    state[L_LEVER_REASON] = REASON_TORQUE
+    room -= settings.torque_lead * max(state[LAW.torque_rate], 0.0)
+    state[LAW.lever_high] = clip(state[LAW.collective] + room / sensitivity, 0.0, 1.0)
+    state[LAW.lever_reason] = REASON_TORQUE

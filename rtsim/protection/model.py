@@ -61,9 +61,9 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
     n = database.df_dnacelle[level][..., slow] + (model.coupling @ of_nacelle)[..., 0]
 
     z = database.x_ref[level][..., slow]
-    cells = np.zeros((*z.shape[:2], kernels.CELL_SIZE))
-    cells[..., kernels.C_STATE : kernels.C_STATE + 4] = z
-    cells[..., kernels.C_CONTROL : kernels.C_CONTROL + 2] = database.u_ref[level][..., inputs[:2]]
+    cells = np.zeros((*z.shape[:2], kernels.CELL.size))
+    cells[..., kernels.CELL.state : kernels.CELL.state + 4] = z
+    cells[..., kernels.CELL.control : kernels.CELL.control + 2] = database.u_ref[level][..., inputs[:2]]
     u, w, q, pitch = (z[..., k] for k in range(4))
     air = a[..., :3, :3].copy()
     # Coriolis terms leave the aerodynamics; gravity goes with the pitch column, which is left out.
@@ -71,22 +71,22 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
     air[..., 0, 2] -= -w
     air[..., 1, 0] -= q
     air[..., 1, 2] -= u
-    cells[..., kernels.C_AIR] = GRAVITY * np.sin(pitch) + q * w
-    cells[..., kernels.C_AIR + 1] = -GRAVITY * np.cos(pitch) - q * u
-    cells[..., kernels.C_A : kernels.C_A + 9] = air.reshape(*z.shape[:2], 9)
-    cells[..., kernels.C_B : kernels.C_B + 9] = b[..., :3, :].reshape(*z.shape[:2], 9)
-    cells[..., kernels.C_NACELLE : kernels.C_NACELLE + 3] = n[..., :3]
+    cells[..., kernels.CELL.air] = GRAVITY * np.sin(pitch) + q * w
+    cells[..., kernels.CELL.air + 1] = -GRAVITY * np.cos(pitch) - q * u
+    cells[..., kernels.CELL.a : kernels.CELL.a + 9] = air.reshape(*z.shape[:2], 9)
+    cells[..., kernels.CELL.b : kernels.CELL.b + 9] = b[..., :3, :].reshape(*z.shape[:2], 9)
+    cells[..., kernels.CELL.nacelle : kernels.CELL.nacelle + 3] = n[..., :3]
 
     torque = required_position(database.outputs, "torque", "protection")
     row = C[..., torque, :]
     rows = {
-        kernels.C_TORQUE: (
+        kernels.CELL.torque: (
             database.y_ref[level][..., torque],
             row[..., slow] + np.einsum("...f,...fz->...z", row[..., fast], of_state),
             D[..., torque, :][..., inputs] + np.einsum("...f,...fu->...u", row[..., fast], of_input),
         )
     }
-    for place, name in ((kernels.C_FLAP_C, "flap_1c"), (kernels.C_FLAP_S, "flap_1s")):
+    for place, name in ((kernels.CELL.flap_c, "flap_1c"), (kernels.CELL.flap_s, "flap_1s")):
         state = required_position(database.states, name, "protection")
         k = fast.index(state)
         rows[place] = (database.x_ref[level][..., state], of_state[..., k, :], of_input[..., k, :])
@@ -95,7 +95,7 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
         cells[..., place + 1 : place + 4] = with_state[..., :3]
         cells[..., place + 4 : place + 7] = with_input
     gain = regulator_gains(a, b[..., :2], z, weights)
-    cells[..., kernels.C_GAIN : kernels.C_GAIN + 8] = gain.reshape(*z.shape[:2], 8)
+    cells[..., kernels.CELL.gain : kernels.CELL.gain + 8] = gain.reshape(*z.shape[:2], 8)
     nacelle = load_nacelle_tables(database.profile)
     cells.setflags(write=False)
     return ModelTables(

@@ -136,7 +136,7 @@ class MarginMonitor:
         self.tables = monitor_tables(boundary, database)
         self._limits = load_levels(database.profile)
         self._law = law_tables("monitor", database, dt=dt, boundary=boundary)
-        self._law_state = np.zeros(law_data.LAW_STATE_SIZE)
+        self._law_state = np.zeros(law_data.LAW.size)
         self._levels = MarginWatch(self.tables, self._limits, dt)
         self._work = np.zeros(law_data.WORK_SIZE)
         self._frame = 0
@@ -159,9 +159,9 @@ class MarginMonitor:
         acting = np.array([command.stick, command.lever, command.nacelle_rate])
         law_kernels.protect(self._law, self._law_state, self._frame, known, acting, acting.copy(), self._work)
         self._frame += 1
-        ahead = float(self._law_state[law_data.L_TIME])
+        ahead = float(self._law_state[law_data.LAW.time])
         margins, levels = self._levels.look(known[None, :], np.array([ahead]))
-        side = float(self._law_state[law_data.L_SIDE])
+        side = float(self._law_state[law_data.LAW.side])
         return Reading(
             margins=dict(zip(WATCHED, margins[0].tolist(), strict=True)),
             levels={name: LEVEL_NAMES[int(level)] for name, level in zip(WATCHED, levels[0], strict=True)},

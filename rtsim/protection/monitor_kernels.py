@@ -12,16 +12,7 @@ from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.places import Places
-from rtsim.protection.law_data import (
-    L_SIDE,
-    L_TIME,
-    LAW_MONITOR,
-    LAW_STATE_SIZE,
-    WORK_SIZE,
-    ProtectionTables,
-    SinkTables,
-    TorqueTables,
-)
+from rtsim.protection.law_data import LAW, LAW_MONITOR, WORK_SIZE, ProtectionTables, SinkTables, TorqueTables
 from rtsim.protection.law_kernels import law_start, protect
 from rtsim.protection.limiter_kernels import allowed_sink, torque_limit
 from rtsim.protection.prediction_kernels import BoundaryTables, speed_range
@@ -235,9 +226,9 @@ def predict(
     watching = ProtectionTables(
         LAW_MONITOR, tables.every, tables.model, tables.corridor, tables.torque, tables.sink, tables.settings
     )
-    state = np.empty(LAW_STATE_SIZE)
+    state = np.empty(LAW.size)
     law_start(watching, state)
     work, applied = np.empty(WORK_SIZE), np.empty(3)
     for k in range(sensors.shape[0]):
         protect(watching, state, k, sensors[k], acting[k], applied, work)
-        time_to_limit[k], side[k] = state[L_TIME], state[L_SIDE]
+        time_to_limit[k], side[k] = state[LAW.time], state[LAW.side]

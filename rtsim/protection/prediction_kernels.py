@@ -15,35 +15,32 @@ from typing import NamedTuple
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import bilinear
+from rtsim.places import Places
 from rtsim.units import GRAVITY
 
-# Places in one cell of ModelTables.cells.
-C_STATE = 0
-"""Trim state u, w, q, pitch."""
-C_CONTROL = 4
-"""Trim stick, lever."""
-C_AIR = 6
-"""Aerodynamic accelerations at the trim: u', w', q'."""
-C_A = 9
-"""Their derivatives with u, w, q; rows u', w', q' (3 x 3). Specific force does not depend on attitude."""
-C_B = 18
-"""Their derivatives with stick, lever, nacelle rate (3 x 3)."""
-C_NACELLE = 27
-"""Their derivatives with the nacelle angle (3)."""
-C_TORQUE = 30
-"""Mast torque at the trim, its derivatives with u, w, q, stick, lever, nacelle rate (7)."""
-C_FLAP_C = 37
-"""The same of the cosine flapping (7)."""
-C_FLAP_S = 44
-"""The same of the sine flapping (7)."""
-C_GAIN = 51
-"""Regulator of the recovery: stick and lever per deviation of u, w, q, pitch (2 x 4)."""
-CELL_SIZE = 59
+CELL = Places(
+    ("state", 4),  # trim u, w, q, pitch
+    ("control", 2),  # trim stick, lever
+    ("air", 3),  # aerodynamic accelerations at the trim: u', w', q'
+    ("a", 9),  # their derivatives with u, w, q; rows u', w', q' (3 x 3); specific force does not depend on attitude
+    ("b", 9),  # their derivatives with stick, lever, nacelle rate (3 x 3)
+    ("nacelle", 3),  # their derivatives with the nacelle angle
+    ("torque", 7),  # mast torque at the trim, its derivatives with u, w, q, stick, lever, nacelle rate
+    ("flap_c", 7),  # the same of the cosine flapping
+    ("flap_s", 7),  # the same of the sine flapping
+    ("gain", 8),  # regulator of the recovery: stick and lever per deviation of u, w, q, pitch (2 x 4)
+)
+"""Places in one cell of ``ModelTables.cells``."""
 
-OUT_LOW, OUT_HIGH, OUT_LOW_END, OUT_HIGH_END, OUT_TIME, OUT_SIDE = 0, 1, 2, 3, 4, 5
-"""Places in the result of ``roll_out``: least margins to the low and the high side, both at the end [m/s], time of the
-first crossing [s] (the horizon where there is none), its side (-1 low, 1 high, 0 none)."""
-ROLL_OUT_SIZE = 6
+OUT = Places(
+    "low",  # least margins to the low and the high side [m/s]
+    "high",
+    "low_end",  # both at the end [m/s]
+    "high_end",
+    "time",  # of the first crossing [s]; the horizon where there is none
+    "side",  # its side: -1 low, 1 high, 0 none
+)
+"""Places in the result of ``roll_out``."""
 
 
 class ModelTables(NamedTuple):
@@ -101,7 +98,7 @@ def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArr
     Args:
         out: Written: one cell, shape (CELL_SIZE,).
     """
-    bilinear(tables, tables.cells, airspeed, nacelle, CELL_SIZE, out)
+    bilinear(tables, tables.cells, airspeed, nacelle, CELL.size, out)
 
 
 @inner_kernel
@@ -112,18 +109,18 @@ def affine(
 
     Args:
         cell: The model.
-        place: ``C_TORQUE``, ``C_FLAP_C`` or ``C_FLAP_S``.
+        place: ``CELL.torque``, ``CELL.flap_c`` or ``CELL.flap_s``.
         z: u, w [m/s], q [rad/s], pitch [rad].
         controls: Stick and lever.
         rate: Nacelle rate [rad/s].
     """
     return float(
         cell[place]
-        + cell[place + 1] * (z[0] - cell[C_STATE])
-        + cell[place + 2] * (z[1] - cell[C_STATE + 1])
-        + cell[place + 3] * (z[2] - cell[C_STATE + 2])
-        + cell[place + 4] * (controls[0] - cell[C_CONTROL])
-        + cell[place + 5] * (controls[1] - cell[C_CONTROL + 1])
+        + cell[place + 1] * (z[0] - cell[CELL.state])
+        + cell[place + 2] * (z[1] - cell[CELL.state + 1])
+        + cell[place + 3] * (z[2] - cell[CELL.state + 2])
+        + cell[place + 4] * (controls[0] - cell[CELL.control])
+        + cell[place + 5] * (controls[1] - cell[CELL.control + 1])
         + cell[place + 6] * rate
     )
 
@@ -144,20 +141,20 @@ def accelerations(
         nacelle: Nacelle angle minus that of the model [rad], nacelle rate [rad/s].
     """
     u, w, q, pitch = z
-    du, dw, dq = u - cell[C_STATE], w - cell[C_STATE + 1], q - cell[C_STATE + 2]
-    ds, dl = controls[0] - cell[C_CONTROL], controls[1] - cell[C_CONTROL + 1]
+    du, dw, dq = u - cell[CELL.state], w - cell[CELL.state + 1], q - cell[CELL.state + 2]
+    ds, dl = controls[0] - cell[CELL.control], controls[1] - cell[CELL.control + 1]
     dn, rate = nacelle
     a = (
-        cell[C_AIR] + cell[C_A] * du + cell[C_A + 1] * dw + cell[C_A + 2] * dq
-        + cell[C_B] * ds + cell[C_B + 1] * dl + cell[C_B + 2] * rate + cell[C_NACELLE] * dn
+        cell[CELL.air] + cell[CELL.a] * du + cell[CELL.a + 1] * dw + cell[CELL.a + 2] * dq
+        + cell[CELL.b] * ds + cell[CELL.b + 1] * dl + cell[CELL.b + 2] * rate + cell[CELL.nacelle] * dn
     )  # fmt: skip
     b = (
-        cell[C_AIR + 1] + cell[C_A + 3] * du + cell[C_A + 4] * dw + cell[C_A + 5] * dq
-        + cell[C_B + 3] * ds + cell[C_B + 4] * dl + cell[C_B + 5] * rate + cell[C_NACELLE + 1] * dn
+        cell[CELL.air + 1] + cell[CELL.a + 3] * du + cell[CELL.a + 4] * dw + cell[CELL.a + 5] * dq
+        + cell[CELL.b + 3] * ds + cell[CELL.b + 4] * dl + cell[CELL.b + 5] * rate + cell[CELL.nacelle + 1] * dn
     )  # fmt: skip
     m = (
-        cell[C_AIR + 2] + cell[C_A + 6] * du + cell[C_A + 7] * dw + cell[C_A + 8] * dq
-        + cell[C_B + 6] * ds + cell[C_B + 7] * dl + cell[C_B + 8] * rate + cell[C_NACELLE + 2] * dn
+        cell[CELL.air + 2] + cell[CELL.a + 6] * du + cell[CELL.a + 7] * dw + cell[CELL.a + 8] * dq
+        + cell[CELL.b + 6] * ds + cell[CELL.b + 7] * dl + cell[CELL.b + 8] * rate + cell[CELL.nacelle + 2] * dn
     )  # fmt: skip
     sine, cosine = math.sin(pitch), math.cos(pitch)
     # The Coriolis terms turn the velocity with the body and leave the horizontal airspeed alone.
@@ -212,9 +209,9 @@ def roll_out(
     settle = math.exp(-f * step)
     fade = math.exp(-step / decay)
     carried = 0.0  # airspeed gained from what the model misses
-    out[OUT_TIME] = horizon
-    out[OUT_SIDE] = 0.0
-    out[OUT_LOW], out[OUT_HIGH] = 1e9, 1e9
+    out[OUT.time] = horizon
+    out[OUT.side] = 0.0
+    out[OUT.low], out[OUT.high] = 1e9, 1e9
     before = 0.0
     for k in range(int(horizon / step + 0.5) + 1):
         a, b, m, _, airspeed = accelerations(cell, (u, w, q, pitch), controls, (angle - here, rate))
@@ -222,13 +219,13 @@ def roll_out(
         slowest, fastest = speed_range(corridor, angle)
         low, high = airspeed - slowest, fastest - airspeed
         margin = min(low, high)
-        out[OUT_LOW] = min(out[OUT_LOW], low)
-        out[OUT_HIGH] = min(out[OUT_HIGH], high)
-        out[OUT_LOW_END], out[OUT_HIGH_END] = low, high
-        if margin < 0.0 and out[OUT_SIDE] == 0.0:
+        out[OUT.low] = min(out[OUT.low], low)
+        out[OUT.high] = min(out[OUT.high], high)
+        out[OUT.low_end], out[OUT.high_end] = low, high
+        if margin < 0.0 and out[OUT.side] == 0.0:
             share = before / (before - margin) if k > 0 and before > margin else 0.0
-            out[OUT_TIME] = (k - 1 + share) * step if k > 0 else 0.0
-            out[OUT_SIDE] = -1.0 if low < high else 1.0
+            out[OUT.time] = (k - 1 + share) * step if k > 0 else 0.0
+            out[OUT.side] = -1.0 if low < high else 1.0
         before = margin
         # Semi-implicit: the fast pitch motion first, so that a step of a tenth of a second stays stable.
         up = sharpness * (sharpness * (steepest - pitch) - 2.0 * q)

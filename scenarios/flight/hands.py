@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol, get_args
 
-from rtsim.aids.aids_kernels import MAP_STICK, scheduled
+from rtsim.aids.aids_kernels import MAP, scheduled
 from rtsim.aids.design import SWITCHES
 from rtsim.arrays import FloatArray
 from rtsim.choices import PilotMode, SwitchName
@@ -201,7 +201,7 @@ class Hands:
         """Stick that trims with the hands off: none where the bias schedule supplies it."""
         if "trim_bias" in simulation.aids:
             return 0.0
-        return float(scheduled(simulation.tables.aids, MAP_STICK, self._airspeed, self._angle))
+        return float(scheduled(simulation.tables.aids, MAP.stick, self._airspeed, self._angle))
 
     def _aid_bits(self, aids: tuple[SwitchName, ...]) -> float:
         if aids != self._known_aids:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from rtsim.aids.aids_kernels import MAP_STICK_FLAPS
+from rtsim.aids.aids_kernels import MAP
 from rtsim.aids.design import SWITCHES
 from rtsim.aircraft.variables import STATE
 from rtsim.analysis.handling import handling
@@ -162,7 +162,7 @@ def test_flaps_by_hand_do_not_pitch_the_aircraft(plant: str) -> None:
         parts = build_parts(flight)
         if not answered:
             maps = parts.tables.aids.maps.copy()
-            maps[MAP_STICK_FLAPS:] = 0.0
+            maps[MAP.stick_flaps :] = 0.0
             aids = parts.tables.aids._replace(maps=maps)
             parts = dataclasses.replace(parts, tables=parts.tables._replace(aids=aids))
         simulation = Simulation(flight, parts=parts)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import scenarios
-from rtsim.aids.aids_kernels import MAP_PITCH_DAMPING
+from rtsim.aids.aids_kernels import MAP
 from rtsim.aids.design import design_aids
 from rtsim.aircraft.profile import parse_profile, xv15_profile
 from rtsim.aircraft.variables import position
@@ -146,8 +146,8 @@ def test_a_similar_aircraft_answers_alike_in_scaled_time(example: ModuleType) ->
                 rtol=1e-9,
                 atol=1e-9,
             )
-    damping = design_aids(similar).maps[MAP_PITCH_DAMPING] * size**0.5
-    np.testing.assert_allclose(damping, design_aids(shipped).maps[MAP_PITCH_DAMPING], rtol=1e-9, atol=1e-12)
+    damping = design_aids(similar).maps[MAP.pitch_damping] * size**0.5
+    np.testing.assert_allclose(damping, design_aids(shipped).maps[MAP.pitch_damping], rtol=1e-9, atol=1e-12)
 
 
 def response(aircraft: LpvAircraft, airspeed: float, nacelle: float, time: float) -> np.ndarray:

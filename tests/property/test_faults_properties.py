@@ -61,7 +61,7 @@ def test_the_state_depends_on_the_schedule_not_on_how_often_it_is_asked(some, as
     last = max(asked)
     kernels.fault_update(tables, once, last, x, nacelle, 3.0, 30.0)
     assert (often == once).all()
-    assert once[kernels.F_NEXT] == sum(event.time <= last + 1e-9 for event in fault_events(some))
+    assert once[kernels.FAULT.next] == sum(event.time <= last + 1e-9 for event in fault_events(some))
 
 
 @given(st.lists(faults(), max_size=6), st.floats(-1.0, 1.0), st.floats(-30.0, 130.0))

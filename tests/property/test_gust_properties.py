@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere.air import GUST_SHAPES, gust_tables, new_gust_state
-from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, gust_shape, gust_step
+from rtsim.atmosphere.gust_kernels import GUST, gust_shape, gust_step
 from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
 
 DT = 0.01
@@ -42,11 +42,11 @@ def test_body_and_earth_components_are_one_vector_within_the_amplitudes(some, sp
     for k in range(frames):
         gust_step(tables, state, speed, height, pitch, k * DT, DT if k else 0.0, np.zeros(0), out)
     size = np.hypot(out[0], out[1])
-    assert abs(size - np.hypot(state[G_AHEAD], state[G_BELOW])) < 1e-9
+    assert abs(size - np.hypot(state[GUST.ahead], state[GUST.below])) < 1e-9
     assert size <= sum(np.hypot(gust.ahead, gust.below) for gust in some) + 1e-9
     assert out[2] == 0.0
     # What the airspeed indicator and the climb rate see, from the body components.
-    assert abs(out[0] * np.cos(pitch) + out[1] * np.sin(pitch) - state[G_AHEAD]) < 1e-9
+    assert abs(out[0] * np.cos(pitch) + out[1] * np.sin(pitch) - state[GUST.ahead]) < 1e-9
 
 
 @given(st.floats(0.0, 20.0), speeds, heights, st.lists(normals, min_size=1, max_size=20))

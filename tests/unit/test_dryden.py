@@ -10,16 +10,16 @@ from __future__ import annotations
 import itertools
 import math
 
-import numba
 import numpy as np
 import pytest
 from scipy import linalg, signal
 
 from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere.air import gust_tables, new_gust_state, set_turbulence
-from rtsim.atmosphere.gust_kernels import G_AHEAD, G_BELOW, G_Q, gust_step
+from rtsim.atmosphere.gust_kernels import GUST, gust_step
 from rtsim.atmosphere.specification import AirSpecification, Turbulence
 from rtsim.errors import InputError
+from rtsim.kernels.compiled import allocating_kernel
 from rtsim.units import FOOT, KNOT, ft, kt
 
 
@@ -47,13 +47,13 @@ MODERATE = AirSpecification(turbulence=Turbulence(wind_at_20_ft=kt(30.0), fade_i
 TABLES = gust_tables(MODERATE)
 
 
-@numba.njit
+@allocating_kernel
 def loop(tables, state, speed, altitude, dt, history):
     """Replace each row of normals by the gusts: ahead, below, pitch."""
     out = np.empty(3)
     for k in range(history.shape[0]):
         gust_step(tables, state, speed[k], altitude[k], 0.0, k * dt, dt if k else 0.0, history[k], out)
-        history[k, 0], history[k, 1], history[k, 2] = state[G_AHEAD], state[G_BELOW], state[G_Q]
+        history[k, 0], history[k, 1], history[k, 2] = state[GUST.ahead], state[GUST.below], state[GUST.q]
 
 
 def fly(air, *, speed, altitude, seconds, seed, dt=DT):
@@ -239,10 +239,10 @@ def test_a_step_of_speed_moves_no_gust():
 def test_the_pitch_gust_is_the_slope_of_the_vertical_gust_met_from_ahead():
     """Air that rises more and more ahead lifts the nose; felt as air-relative motion it is a pitch-down rate."""
     tables = TABLES.turbulence
-    state = np.zeros(dryden.T_SIZE)
-    state[dryden.T_ACTIVE] = 1.0
-    state[dryden.T_WIND] = state[dryden.T_WIND_TARGET] = kt(30.0)
-    state[dryden.T_W_1] = 1.0
+    state = np.zeros(dryden.TURBULENCE.size)
+    state[dryden.TURBULENCE.active] = 1.0
+    state[dryden.TURBULENCE.wind] = state[dryden.TURBULENCE.wind_target] = kt(30.0)
+    state[dryden.TURBULENCE.w_1] = 1.0
     gusts = [dryden.turbulence_step(tables, state, 50.0, 100.0, dt, np.zeros(3)) for dt in (0.0, DT)]
     slope = (gusts[1][1] - gusts[0][1]) / (50.0 * DT)
     a = DT * 50.0 * math.pi / (4.0 * SPAN)
@@ -252,8 +252,8 @@ def test_the_pitch_gust_is_the_slope_of_the_vertical_gust_met_from_ahead():
 
 def test_normals_of_the_first_state_are_its_filters():
     state = new_gust_state(MODERATE, np.array([0.3, -0.8, 1.2]))
-    assert state[dryden.T_U] == 0.3
-    assert (state[dryden.T_W_1], state[dryden.T_W_2]) == (-0.8, 1.2)
+    assert state[dryden.TURBULENCE.u] == 0.3
+    assert (state[dryden.TURBULENCE.w_1], state[dryden.TURBULENCE.w_2]) == (-0.8, 1.2)
     with pytest.raises(ValueError, match="three standard normals"):
         new_gust_state(MODERATE)
 
@@ -268,7 +268,7 @@ def test_turbulence_fades_in_from_calm_air_and_out_to_exact_calm():
         if k == 1000:
             set_turbulence(state, Turbulence(wind_at_20_ft=0.0, fade_in=1.0), random.standard_normal(3))
         gust_step(TABLES, state, 40.0, 100.0, 0.0, k * DT, DT if k else 0.0, random.standard_normal(3), out)
-        winds.append(state[dryden.T_WIND])
+        winds.append(state[dryden.TURBULENCE.wind])
         if k == 0 or k > 1250:
             assert (out == 0.0).all()
         elif k < 1000:

@@ -300,9 +300,9 @@ def test_the_schedule_is_what_the_event_log_says():
         FaultEvent(6.0, "cyclic-slow on", deg(2.0)),
     )
     schedule = fault_tables(faults).schedule
-    assert schedule.shape == (4, kernels.SCHEDULE_COLUMNS)
+    assert schedule.shape == (4, kernels.EVENT.size)
     assert not schedule.flags.writeable
-    assert fault_tables([]).schedule.shape == (0, kernels.SCHEDULE_COLUMNS)
+    assert fault_tables([]).schedule.shape == (0, kernels.EVENT.size)
 
 
 def test_the_mask_names_every_failure():

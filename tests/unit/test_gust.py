@@ -24,7 +24,7 @@ def fly(air, *, seconds, speed=50.0, pitch=0.0):
     history = []
     for k in range(round(seconds / DT) + 1):
         kernels.gust_step(tables, state, speed, 100.0, pitch, k * DT, DT if k else 0.0, NO_NORMALS, out)
-        history.append((*out, state[kernels.G_AHEAD], state[kernels.G_BELOW]))
+        history.append((*out, state[kernels.GUST.ahead], state[kernels.GUST.below]))
     return np.array(history), state
 
 
@@ -37,7 +37,7 @@ def test_one_minus_cosine_rises_and_falls_over_its_duration():
     assert (history[~inside][:, :3] == 0.0).all()
     assert (history[:, 0] == 0.0).all()
     assert (history[:, 2] == 0.0).all()
-    assert state[kernels.SLOTS + kernels.SLOT_SHAPE] == kernels.SHAPE_NONE
+    assert state[kernels.GUST.size + kernels.SLOT.shape] == kernels.SHAPE_NONE
 
 
 def test_build_up_and_ramp_rise_and_stay():
@@ -118,19 +118,19 @@ def test_no_gust_is_exactly_no_gust(air):
 
 def test_busy_says_when_a_frame_may_leave_the_gusts_out():
     air = AirSpecification(gusts=(Gust(start=0.5, ahead=1.0, duration=0.5),))
-    assert new_gust_state(AirSpecification())[kernels.G_BUSY] == 0.0
+    assert new_gust_state(AirSpecification())[kernels.GUST.busy] == 0.0
     tables, state, out = gust_tables(air), new_gust_state(air), np.empty(3)
-    busy = [state[kernels.G_BUSY]]
+    busy = [state[kernels.GUST.busy]]
     for time in (0.0, 0.6, 1.1, 1.2):
         kernels.gust_step(tables, state, 50.0, 100.0, 0.0, time, DT, NO_NORMALS, out)
-        busy.append(state[kernels.G_BUSY])
+        busy.append(state[kernels.GUST.busy])
     assert busy == [1.0, 1.0, 1.0, 1.0, 0.0]
     assert (out == 0.0).all()
     add_gust(state, Gust(start=0.0, ahead=1.0, duration=0.1))
-    assert state[kernels.G_BUSY] == 1.0
+    assert state[kernels.GUST.busy] == 1.0
     calm = new_gust_state(AirSpecification())
     set_turbulence(calm, Turbulence.of_severity("light"), np.zeros(3))
-    assert calm[kernels.G_BUSY] == 1.0
+    assert calm[kernels.GUST.busy] == 1.0
 
 
 def test_gusts_add_up():

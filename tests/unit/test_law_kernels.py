@@ -32,7 +32,7 @@ class Bench:
     def __init__(self, tables, airspeed_kt=105.0, nacelle_deg=50.0):
         point = load_aircraft().trim(airspeed=kt(airspeed_kt), nacelle=deg(nacelle_deg))
         self.tables = tables
-        self.state = np.zeros(data.LAW_STATE_SIZE)
+        self.state = np.zeros(data.LAW.size)
         kernels.law_start(tables, self.state)
         self.sensors = np.zeros(SENSOR.size)
         self.sensors[SENSOR.airspeed] = kt(airspeed_kt)
@@ -58,7 +58,7 @@ class Bench:
         return applied - self.trim
 
     def cause(self, channel):
-        places = {"stick": data.L_STICK_CAUSE, "lever": data.L_LEVER_CAUSE, "rate": data.L_RATE_CAUSE}
+        places = {"stick": data.LAW.stick_cause, "lever": data.LAW.lever_cause, "rate": data.LAW.rate_cause}
         return int(self.state[places[channel]])
 
 
@@ -98,7 +98,7 @@ def test_governor_turns_the_nacelles_back_when_stopping_is_not_enough(tables):
     bench.sensors[SENSOR.airspeed_rate] = -kt(4.0)
     moved = [bench.step(rate=-deg(7.5), frames=5)[2] for _ in range(40)]
     assert moved[-1] > deg(1.0)
-    assert bench.state[data.L_KIND] == 1.0
+    assert bench.state[data.LAW.kind] == 1.0
     assert bench.cause("rate") == data.REASON_LOW
     # A pilot who turns back faster by himself is let.
     assert bench.step(rate=deg(12.0))[2] == deg(12.0)
@@ -125,13 +125,13 @@ def test_full_takes_over_before_the_low_side_and_gives_back(tables):
     bench.sensors[SENSOR.airspeed_rate] = -kt(4.0)
     for _ in range(50):
         change = bench.step(lever=-0.1, frames=5)
-    assert bench.state[data.L_BLEND] == 1.0
+    assert bench.state[data.LAW.blend] == 1.0
     assert change[1] > -0.1
     assert bench.cause("lever") == data.REASON_LOW
     bench.sensors[SENSOR.airspeed] = kt(125.0)
     bench.sensors[SENSOR.airspeed_rate] = 0.0
     bench.step(frames=5)
-    assert 0.9 < bench.state[data.L_BLEND] < 1.0
+    assert 0.9 < bench.state[data.LAW.blend] < 1.0
     np.testing.assert_array_equal(bench.step(frames=700), [0.0, 0.0, 0.0])
     assert bench.cause("lever") == data.REASON_NONE
 
@@ -141,7 +141,7 @@ def test_full_reduces_power_before_the_high_side(tables):
     bench.sensors[SENSOR.airspeed_rate] = kt(4.0)
     for _ in range(4):  # no longer: the torque shown here does not follow the lever, which the torque limit answers
         change = bench.step(frames=5)
-    assert bench.state[data.L_BLEND] > 0.2
+    assert bench.state[data.LAW.blend] > 0.2
     assert change[1] < 0.0
     assert bench.cause("lever") == data.REASON_HIGH
 
@@ -151,23 +151,23 @@ def test_full_leaves_the_hands_alone_near_the_ground(tables):
     bench = Bench(tables["full"], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 1.0)
     bench.sensors[SENSOR.altitude] = 9.0
     bench.step(frames=100)
-    assert bench.state[data.L_BLEND] == 0.0
+    assert bench.state[data.LAW.blend] == 0.0
     bench.sensors[SENSOR.altitude] = 40.0
     bench.step(frames=100)
-    assert bench.state[data.L_BLEND] > 0.2
+    assert bench.state[data.LAW.blend] > 0.2
 
 
 def test_full_stops_a_descent_that_is_too_steep(tables):
     bench = Bench(tables["full"], 105.0, 50.0)
     bench.sensors[SENSOR.climb_rate] = -12.0
     bench.step(frames=100)
-    assert bench.state[data.L_BLEND] == 1.0
-    assert bench.state[data.L_BLEND_REASON] == data.REASON_SINK
+    assert bench.state[data.LAW.blend] == 1.0
+    assert bench.state[data.LAW.blend_reason] == data.REASON_SINK
     high = Bench(tables["full"], 105.0, 50.0)
     high.sensors[SENSOR.climb_rate] = -12.0
     high.sensors[SENSOR.altitude] = 1500.0
     high.step(frames=100)
-    assert high.state[data.L_BLEND] == 0.0
+    assert high.state[data.LAW.blend] == 0.0
 
 
 def test_full_keeps_the_mast_torque(tables):
@@ -193,7 +193,7 @@ def test_full_keeps_the_flapping(tables):
         stick = bench.trim[0] + bench.step(stick=direction * 2.0, frames=5)[0]
         flapping = [
             prediction.affine(cell, place, z, (stick, bench.trim[1]), 0.0)
-            for place in (prediction.C_FLAP_C, prediction.C_FLAP_S)
+            for place in (prediction.CELL.flap_c, prediction.CELL.flap_s)
         ]
         assert np.hypot(*flapping) <= deg(10.5) * 1.02
 
@@ -241,10 +241,10 @@ def test_a_command_that_is_no_number_is_answered_with_what_acted_last(tables):
 def test_override_gives_the_authority_to_the_pilot_and_back(tables):
     bench = Bench(tables["full"], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 1.0)
     bench.step(rate=-deg(7.5), lever=-0.1, frames=100)
-    bench.state[data.L_OVERRIDE] = 1.0
+    bench.state[data.LAW.override] = 1.0
     np.testing.assert_allclose(bench.step(rate=-deg(7.5), lever=-0.1, frames=20), [0.0, -0.1, -deg(7.5)], atol=1e-15)
-    assert bench.state[data.L_SIDE] != 0.0 or bench.state[data.L_TIME] > 0.0
-    bench.state[data.L_OVERRIDE] = 0.0
+    assert bench.state[data.LAW.side] != 0.0 or bench.state[data.LAW.time] > 0.0
+    bench.state[data.LAW.override] = 0.0
     assert bench.step(rate=-deg(7.5), lever=-0.1)[2] >= 0.0
 
 
@@ -255,7 +255,7 @@ def test_a_jammed_nacelle_is_not_predicted_to_move(tables):
         bench = Bench(tables["monitor"], low + 8.0)
         bench.sensors[SENSOR.nacelle_ok] = float(healthy)
         bench.step(rate=-deg(7.5), frames=50)
-        assert bool(bench.state[data.L_SIDE] == -1.0) == healthy
+        assert bool(bench.state[data.LAW.side] == -1.0) == healthy
 
 
 def test_decisions_are_made_fifty_times_a_second(tables):

@@ -31,7 +31,7 @@ def tables(database):
 
 
 def cell_at(tables, airspeed, nacelle):
-    cell = np.zeros(kernels.CELL_SIZE)
+    cell = np.zeros(kernels.CELL.size)
     kernels.model_at(tables, airspeed, nacelle, cell)
     return cell
 
@@ -44,7 +44,7 @@ def valid_points(database, every=1):
 def test_trim_is_an_equilibrium_of_the_reduced_model(database, tables):
     for i, j in valid_points(database):
         cell = tables.cells[i, j]
-        z, c = tuple(cell[:4]), tuple(cell[kernels.C_CONTROL : kernels.C_CONTROL + 2])
+        z, c = tuple(cell[:4]), tuple(cell[kernels.CELL.control : kernels.CELL.control + 2])
         du, dw, dq, rate, airspeed = kernels.accelerations(cell, z, c, (0.0, 0.0))
         assert max(abs(du), abs(dw), abs(dq), abs(rate)) < 1e-9
         assert airspeed == pytest.approx(database.airspeed[i], abs=1e-6)
@@ -63,7 +63,7 @@ def test_reduced_accelerations_are_those_of_the_settled_lpv_aircraft(database, a
     slow = [names.index(name) for name in SLOW]
     fast = [k for k in range(len(names)) if k not in slow and names[k] != "altitude"]
     cell = reduce_model(database, load_weights()).cells[i, j]
-    trim, controls = cell[:4], cell[kernels.C_CONTROL : kernels.C_CONTROL + 2]
+    trim, controls = cell[:4], cell[kernels.CELL.control : kernels.CELL.control + 2]
     step = 1e-4
     for k in range(6):
         dz, dc = np.zeros(4), np.zeros(2)
@@ -97,9 +97,9 @@ def test_settled_torque_and_flapping_are_those_of_the_lpv_aircraft(database, tab
     y = aircraft.outputs(x, u, database.nacelle[j])
     cell = cell_at(tables, database.airspeed[i], database.nacelle[j])
     z = tuple(held[:4])
-    torque = kernels.affine(cell, kernels.C_TORQUE, z, (u[0], u[1]), 0.0)
+    torque = kernels.affine(cell, kernels.CELL.torque, z, (u[0], u[1]), 0.0)
     assert torque == pytest.approx(y[outputs.index("torque")], rel=2e-3)
-    for place, name in ((kernels.C_FLAP_C, "flap_1c"), (kernels.C_FLAP_S, "flap_1s")):
+    for place, name in ((kernels.CELL.flap_c, "flap_1c"), (kernels.CELL.flap_s, "flap_1s")):
         assert kernels.affine(cell, place, z, (u[0], u[1]), 0.0) == pytest.approx(x[names.index(name)], abs=2e-4)
 
 
@@ -121,7 +121,7 @@ def test_gains_are_those_of_the_riccati_equation(database, tables):
         cost = seen.T @ np.diag(1.0 / np.square(scale)) @ seen
         effort = np.diag(1.0 / np.square([weights.stick, weights.lever]))
         gain = np.linalg.solve(effort, b.T @ solve_continuous_are(a, b, cost, effort))
-        stored = tables.cells[i, j, kernels.C_GAIN :].reshape(2, 4)
+        stored = tables.cells[i, j, kernels.CELL.gain :].reshape(2, 4)
         np.testing.assert_allclose(stored, gain, rtol=1e-5, atol=1e-7)
 
 
@@ -135,7 +135,7 @@ def test_recovery_is_stable_with_the_whole_aircraft_at_every_trim(database, tabl
         A, B = database.A[level, i, j][np.ix_(keep, keep)], database.B[level, i, j][keep, :2]
         discrete, held, *_ = cont2discrete((A, B, np.eye(len(keep)), np.zeros((len(keep), 2))), 0.02)
         feedback = np.zeros((2, len(keep)))
-        feedback[:, :4] = tables.cells[i, j, kernels.C_GAIN :].reshape(2, 4)
+        feedback[:, :4] = tables.cells[i, j, kernels.CELL.gain :].reshape(2, 4)
         radius = np.abs(np.linalg.eigvals(discrete - held @ feedback)).max()
         worst = max(worst, float(np.log(radius) / 0.02))
     assert worst < -0.2
@@ -146,15 +146,15 @@ def twin_roll_out(tables, corridor, cell, start, controls, nacelle, motion, bias
     z = np.array(start)
     command, angle, rate = nacelle
     here, (missing, decay), (step, horizon) = angle, bias, time
-    A = cell[kernels.C_A : kernels.C_A + 9].reshape(3, 3)
-    B = cell[kernels.C_B : kernels.C_B + 9].reshape(3, 3)
+    A = cell[kernels.CELL.a : kernels.CELL.a + 9].reshape(3, 3)
+    B = cell[kernels.CELL.b : kernels.CELL.b + 9].reshape(3, 3)
     lows, highs = [], []
     carried = 0.0
     for k in range(round(horizon / step) + 1):
         u, w, q, pitch = z
-        inputs = np.array([*(np.array(controls) - cell[kernels.C_CONTROL : kernels.C_CONTROL + 2]), rate])
-        a = cell[kernels.C_AIR : kernels.C_AIR + 3] + A @ (z[:3] - cell[:3]) + B @ inputs
-        a = a + cell[kernels.C_NACELLE : kernels.C_NACELLE + 3] * (angle - here)
+        inputs = np.array([*(np.array(controls) - cell[kernels.CELL.control : kernels.CELL.control + 2]), rate])
+        a = cell[kernels.CELL.air : kernels.CELL.air + 3] + A @ (z[:3] - cell[:3]) + B @ inputs
+        a = a + cell[kernels.CELL.nacelle : kernels.CELL.nacelle + 3] * (angle - here)
         airspeed = u * np.cos(pitch) + w * np.sin(pitch) + carried
         lows.append(airspeed - corridor.low_speed(angle))
         highs.append(corridor.high_speed(angle) - airspeed)
@@ -186,12 +186,12 @@ def test_roll_out_agrees_with_its_twin(tables, seed):
     airspeed = kt(rng.uniform(40.0, 130.0))
     cell = cell_at(tables, airspeed, deg(nacelle))
     start = tuple(cell[:4] + rng.normal(size=4) * [2.0, 1.0, 0.05, 0.03])
-    controls = tuple(cell[kernels.C_CONTROL : kernels.C_CONTROL + 2] + rng.normal(size=2) * 0.05)
+    controls = tuple(cell[kernels.CELL.control : kernels.CELL.control + 2] + rng.normal(size=2) * 0.05)
     angle = deg(nacelle)
     state = (angle + rng.normal() * 0.02, angle, rng.normal() * 0.05)
     motion, bias = (rng.normal() * 0.1, 0.5), (rng.normal() * 0.5, 2.0)
     time, guard = (0.1, 2.0), (deg(22.0), 1.5)
-    out = np.zeros(kernels.ROLL_OUT_SIZE)
+    out = np.zeros(kernels.OUT.size)
     kernels.roll_out(tables, sample_boundary(corridor), cell, start, controls, state, motion, bias, time, guard, out)
     low, high = twin_roll_out(tables, corridor, cell, start, controls, state, motion, bias, time, guard)
     expected = [low.min(), high.min(), low[-1], high[-1]]
@@ -200,11 +200,11 @@ def test_roll_out_agrees_with_its_twin(tables, seed):
     if (margin < 0.0).any():
         k = int(np.argmax(margin < 0.0))
         crossing = 0.0 if k == 0 else 0.1 * (k - 1 + margin[k - 1] / (margin[k - 1] - margin[k]))
-        assert out[kernels.OUT_TIME] == pytest.approx(crossing, abs=1e-9)
-        assert out[kernels.OUT_SIDE] == (-1.0 if low[k] < high[k] else 1.0)
+        assert out[kernels.OUT.time] == pytest.approx(crossing, abs=1e-9)
+        assert out[kernels.OUT.side] == (-1.0 if low[k] < high[k] else 1.0)
     else:
-        assert out[kernels.OUT_TIME] == 2.0
-        assert out[kernels.OUT_SIDE] == 0.0
+        assert out[kernels.OUT.time] == 2.0
+        assert out[kernels.OUT.side] == 0.0
 
 
 def test_sampled_boundaries_are_the_boundaries():
@@ -228,13 +228,13 @@ def test_prediction_follows_the_lpv_aircraft_for_two_seconds(tables):
             x = aircraft.step(x, u, nacelle_angle=nacelle)
         flown = x[0] * np.cos(x[3]) + x[1] * np.sin(x[3])
         cell = cell_at(tables, airspeed, nacelle)
-        out = np.zeros(kernels.ROLL_OUT_SIZE)
+        out = np.zeros(kernels.OUT.size)
         wide = sample_boundary(load_corridor("design"))
         kernels.roll_out(
             tables, wide, cell, tuple(point.x[:4]), (u[0], u[1]), (nacelle, nacelle, 0.0), (0.0, 0.0), (0.0, 2.0),
             (0.1, 2.0), (deg(60.0), 5.0), out,
         )  # fmt: skip
         low = kernels.speed_range(wide, nacelle)[0]
-        predicted = out[kernels.OUT_LOW_END] + low
+        predicted = out[kernels.OUT.low_end] + low
         assert abs(flown - airspeed) > kt(1.0)
         assert abs(predicted - flown) < kt(0.1) + 0.2 * abs(flown - airspeed)

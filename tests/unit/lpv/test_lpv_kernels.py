@@ -196,7 +196,7 @@ def test_step_equals_twin_and_is_bit_reproducible(toy_database, form):
     for frame in range(40):
         path = np.array([[nacelle + rate * (frame + c) * dt, rate, 0.1 * c] for c in (0.0, 0.5, 1.0)])
         kernels.lpv_step(tables, x, u, path, dt, work)
-        work[schedule.W_BLEND :] = rng.normal(size=work.size - schedule.W_BLEND)  # nothing may be carried over
+        work[schedule.WORK.size :] = rng.normal(size=work.size - schedule.WORK.size)  # nothing may be carried over
         kernels.lpv_step(tables, again, u, path, dt, work)
         reference = twin.step(reference, u, path, dt, RATE, ACCELERATION)
     np.testing.assert_allclose(x, reference, rtol=1e-9, atol=1e-9)
@@ -225,10 +225,10 @@ def test_trim_of_every_grid_point_is_steady(toy_database):
         work, xdot = np.zeros(kernels.work_size(tables)), np.zeros(len(toy_database.states))
         for i, j in np.argwhere(toy_database.valid[1]):
             x, u = toy_database.x_ref[1, i, j], toy_database.u_ref[1, i, j]
-            work[kernels.W_FLAGS] = 0.0
+            work[kernels.WORK.flags] = 0.0
             kernels.lpv_derivative(tables, x, u, toy_database.nacelle[j], xdot, work)
             assert np.abs(xdot).max() < 2e-8
-            assert work[kernels.W_FLAGS] == 0.0
+            assert work[kernels.WORK.flags] == 0.0
 
 
 def test_accelerated_trim_accelerates(toy_database):
@@ -279,7 +279,7 @@ def test_layer_shares_sum_to_one_and_are_continuous(toy_database, seed):
     for shift in (0.0, 1e-7):
         work, xdot = np.zeros(kernels.work_size(tables)), np.zeros(x.size)
         kernels.lpv_derivative(tables, x + shift, u, nacelle, xdot, work)
-        shares.append(work[schedule.W_LAYER_SHARE : schedule.W_LAYER_SHARE + 3].copy())
+        shares.append(work[schedule.WORK.layer_share : schedule.WORK.layer_share + 3].copy())
         assert shares[-1].min() >= 0.0
         assert abs(shares[-1].sum() - 1.0) < 1e-12
     assert np.abs(shares[0] - shares[1]).max() < 1e-4
