@@ -22,7 +22,7 @@ from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
-from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState
+from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState, SimulationTables
 from rtsim.loop.flying import WHOLE, Flying
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
@@ -73,7 +73,6 @@ class Simulation:
         self._parts: Parts = build_parts(setup) if parts is None else parts
         self.flying: Flying = prepare(setup, self._parts)
         """The flight as it is flown."""
-        self.tables = self.flying.tables
         self._state, self._scratch = self.flying.state, self.flying.scratch
         self._observed = True
         if laws is None:
@@ -83,6 +82,11 @@ class Simulation:
                 laws = LawChain(chain, dt=self.tables.dt, profile=self.database.profile)
         self.laws = laws
         """The protection laws that are called from Python, one by one; None where a compiled law flies, or none."""
+
+    @property
+    def tables(self) -> SimulationTables:
+        """Everything that is flown with; read-only, since the frame keeps its addresses."""
+        return self.flying.tables
 
     @property
     def dt(self) -> float:

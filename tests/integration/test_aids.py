@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +17,7 @@ from rtsim.command import Command, Sensors
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
+from rtsim.loop.setup import build_parts
 from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.programme import Programme
@@ -156,11 +158,14 @@ def test_flaps_by_hand_do_not_pitch_the_aircraft(plant: str) -> None:
     """One setting in at 150 kn, hands off: the nose moves by 3 deg at most; more where the bias ignores the flaps."""
     moved = {}
     for answered in (True, False):
-        simulation = Simulation(setup(150, 0, aids=STABILITY, plant=plant, altitude=1000.0))
+        flight = setup(150, 0, aids=STABILITY, plant=plant, altitude=1000.0)
+        parts = build_parts(flight)
         if not answered:
-            maps = simulation.tables.aids.maps.copy()
+            maps = parts.tables.aids.maps.copy()
             maps[MAP_STICK_FLAPS:] = 0.0
-            simulation.tables = simulation.tables._replace(aids=simulation.tables.aids._replace(maps=maps))
+            aids = parts.tables.aids._replace(maps=maps)
+            parts = dataclasses.replace(parts, tables=parts.tables._replace(aids=aids))
+        simulation = Simulation(flight, parts=parts)
         lever, pitch = float(simulation._state.u[1]), np.degrees(float(simulation._state.x[STATE.pitch]))
         simulation.step(Command(0.0, lever, 0.0))
         simulation.set_flaps(deg(20.0))
