@@ -15,6 +15,7 @@ import typer
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
+from rtsim.jsonable import to_jsonable
 from rtsim.whole_file import whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def _save(result: CampaignResult, report: dict[str, Any], folder: Path) -> None:
 
     from rtsim.measures.metrics import TRIAL_METRICS, TrialMetrics
 
-    write_whole(folder / "report.json", json.dumps(_finite(report), indent=1))
+    write_whole(folder / "report.json", json.dumps(to_jsonable(report), indent=1))
     with (
         whole_file(folder / "flights.csv") as temporary,
         temporary.open("w", encoding="utf-8", newline="") as stream,
@@ -156,15 +157,6 @@ def _save(result: CampaignResult, report: dict[str, Any], folder: Path) -> None:
                     table.writerow(
                         [item.name, run, law.label, *(f"{value:.9g}" for value in TrialMetrics(values).values())]
                     )
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no infinity: what is not a number is null."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _write_junit(result: CampaignResult, path: Path) -> None:

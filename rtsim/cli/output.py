@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
-from enum import Enum
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Literal
+
+from rtsim.jsonable import to_jsonable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,43 +44,6 @@ console = _LazyConsole("stderr")
 """Where progress, logs, warnings and remarks go: a ``rich.console.Console`` on stderr."""
 results = _LazyConsole("stdout")
 """Where tables and sentences that answer the command go when ``--json`` is not asked for."""
-
-
-def to_jsonable(value: object) -> object:
-    """Turn a value into what JSON can hold.
-
-    NaN and infinities become null (JSON has neither), numpy scalars and arrays become numbers and lists,
-    dataclasses become objects, enumerations their value, paths their text.
-
-    Args:
-        value: Anything made of mappings, sequences, dataclasses, numpy values and plain Python values.
-
-    Returns:
-        Nested dict, list, str, int, float, bool and None.
-
-    Raises:
-        TypeError: Where a value has no JSON form, naming its type.
-    """
-    if value is None or (isinstance(value, (str, bool, int)) and not isinstance(value, Enum)):
-        return value
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    if isinstance(value, Enum):
-        return to_jsonable(value.value)
-    if isinstance(value, PurePath):
-        return str(value)
-    if isinstance(value, Mapping):
-        return {str(key): to_jsonable(item) for key, item in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {field.name: to_jsonable(getattr(value, field.name)) for field in fields(value)}
-    tolist = getattr(value, "tolist", None)  # numpy scalars and arrays, without importing numpy
-    if callable(tolist):
-        return to_jsonable(tolist())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [to_jsonable(item) for item in value]
-    if isinstance(value, complex):
-        return {"re": to_jsonable(value.real), "im": to_jsonable(value.imag)}
-    raise TypeError(f"{type(value).__name__} has no JSON form")
 
 
 def emit_json(value: object) -> None:

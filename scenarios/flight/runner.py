@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
 from rtsim.frame import history_sha256
+from rtsim.jsonable import to_jsonable
 from rtsim.loop import beside
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.metrics import flight_metrics
@@ -288,12 +289,4 @@ def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | 
 
 def _log_summary(record: FlightRecord) -> dict[str, Any]:
     """The end of a log: the record's summary with its wall clock."""
-    return {**_without_nan(record.summary()), "ended_unix_s": time.time()}
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_nan(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return {**to_jsonable(record.summary()), "ended_unix_s": time.time()}

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rtsim.jsonable import to_jsonable
 from rtsim.toml_file import shipped_toml
 from scenarios.reproduction.evidence import Evidence, Number
 from scenarios.reproduction.flights import Variant
@@ -80,7 +80,7 @@ class Claim:
         return {
             "id": self.text.id,
             "holds": self.holds,
-            "measured": {name: _number(value) for name, value in self.measured.items()},
+            "measured": to_jsonable(self.measured),
             "expected": dict(self.text.expected),
             "where": self.text.where,
             "claim": self.text.claim,
@@ -90,11 +90,6 @@ class Claim:
             "carried": self.carried,
             "variants": dict(self.variants),
         }
-
-
-def _number(value: Number) -> Number | None:
-    """The value, or None for what JSON has no number for: a flight that never got there."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _listed(words: Sequence[str]) -> str:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import shlex
 import shutil
 from pathlib import Path
 from typing import Any
 
 from rtsim.errors import OutputError
+from rtsim.jsonable import to_jsonable
 from rtsim.protection.tables import LAW_NAMES
 from scenarios.flight.flight_setup import versions
 from scenarios.flight.runner import FlightOutputs, fly
@@ -40,7 +40,7 @@ def write_bundle(case: Case, folder: Path) -> Path:
             (part / "scenario.toml").write_text(case.scenario.source, encoding="utf-8")
         logs = _logs(case, part)
         verdict = {**case.summary(), "versions": versions(), "logs": logs, "replay": _commands(case, logs)}
-        (part / "verdict.json").write_text(json.dumps(_finite(verdict), indent=1), encoding="utf-8")
+        (part / "verdict.json").write_text(json.dumps(to_jsonable(verdict), indent=1), encoding="utf-8")
         shutil.rmtree(target, ignore_errors=True)
         part.replace(target)
     except OSError as error:
@@ -75,11 +75,3 @@ def _commands(case: Case, logs: dict[str, Any]) -> list[str]:
     database = f" --database {shlex.quote(options.database)}" if options.database else ""
     commands = [f"rtsim test scenario.toml --protection {law} --plant {options.plant}{database}"]
     return commands + [f"rtsim replay {item['log']}" for item in logs.values()]
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

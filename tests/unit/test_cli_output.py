@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.cli.output import console, emit_json, progress, results, to_jsonable
+from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import OutputError
+from rtsim.jsonable import to_jsonable
 from rtsim.whole_file import whole_file
 
 

@@ -92,6 +92,7 @@ def write_database(database: Database, path: str | Path) -> None:
     import netCDF4
 
     with whole_file(path) as part:
+        part.touch()  # the library calls everything that forbids this "Permission denied"
         try:
             with netCDF4.Dataset(str(part), "w", format="NETCDF4") as dataset:
                 _write(dataset, database)
