@@ -64,7 +64,7 @@ def test_recorded_commands_fly_the_same_flight():
     assert history_sha256([np.array(rows)]) == history_sha256([original])
 
 
-PILOT_COLUMNS = tuple(COLUMN._fields.index(name) for name in ("pilot_stick", "pilot_lever", "pilot_nacelle_rate_rad_s"))
+PILOT_COLUMNS = (COLUMN.pilot_stick, COLUMN.pilot_lever, COLUMN.pilot_nacelle_rate_rad_s)
 
 
 def test_severity_none_is_bit_for_bit_calm():

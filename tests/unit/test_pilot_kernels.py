@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtsim.choices import OUTER_LOOPS, OuterLoop
+from rtsim.kernels.packed import packed
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
@@ -22,8 +23,8 @@ from rtsim.units import deg, kt
 DT = 0.004
 SILENCE = np.zeros(0)
 DATABASE = load_database()
-LPV = prepare_tables(DATABASE)
-TABLES: dict[str, PilotTables] = {loop: load_pilot_tables(DATABASE, loop, dt=DT) for loop in OUTER_LOOPS}
+LPV = packed(prepare_tables(DATABASE))
+TABLES: dict[str, PilotTables] = {loop: packed(load_pilot_tables(DATABASE, loop, dt=DT)) for loop in OUTER_LOOPS}
 NAMES = [variable.name for variable in DATABASE.states]
 U, W, Q, PITCH, ALTITUDE = (NAMES.index(name) for name in ("u", "w", "q", "pitch", "altitude"))
 HANDS = [[variable.name for variable in DATABASE.inputs].index(name) for name in ("stick", "lever")]
@@ -311,7 +312,7 @@ def test_overruled_controls_reach_the_internal_model(loop: str) -> None:
     """Stick held off by protection for 3 s: the estimate follows the aircraft and the integrals stand still."""
     nacelle = deg(75.0)
     state, x, hands, reference = engaged(loop, kt(80.0), nacelle)
-    integrals_at = pilot_state_size(TABLES[loop]) - OFFSETS - TABLES[loop].roles[1] - 2
+    integrals_at = pilot_state_size(TABLES[loop]) - OFFSETS - int(TABLES[loop].roles.plant) - 2
     integrals = state[integrals_at : integrals_at + 2].copy()
     fly(loop, state, x, reference, nacelle, 750, hold=hands + np.array([0.03, 0.0]))
     assert state[S_LIMITED] == 1.0
@@ -330,7 +331,7 @@ def test_hands_are_no_faster_than_their_limits(loop: str) -> None:
     state, x, _, reference = engaged(loop, kt(80.0), nacelle)
     x[PITCH] += deg(60.0)  # an upset the pilot did not see coming
     x[Q] += deg(40.0)
-    hands_at = S_ESTIMATE + int(sum(TABLES[loop].roles[1:4]))
+    hands_at = S_ESTIMATE + int(TABLES[loop].roles.plant + TABLES[loop].roles.delay + TABLES[loop].roles.hands)
     out = np.zeros(2)
     limited = False
     for _ in range(200):
