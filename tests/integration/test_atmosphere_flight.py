@@ -60,7 +60,7 @@ def test_recorded_commands_fly_the_same_flight():
     setup = hold(80.0, 75.0, air=MODERATE)
     original = Simulation(setup).run(500)
     replay = Simulation(setup)
-    rows = [replay.step(Command(*(float(row[COLUMN[name]]) for name in PILOT_COLUMNS))) for row in original]
+    rows = [replay.step(Command(*(float(row[column]) for column in PILOT_COLUMNS))) for row in original]
     assert history_sha256([np.array(rows)]) == history_sha256([original])
 
 
