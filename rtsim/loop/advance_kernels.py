@@ -18,9 +18,10 @@ from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
-from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, MODE, PART, PROGRAMME, REFERENCE, STATION, TARGET, Flight
+from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, MODE, PART, PROGRAMME, REFERENCE, STATION, Flight
 from rtsim.loop.observe_kernels import programme_at
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
+from rtsim.pilot.layout_kernels import TARGET
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
 from rtsim.systems.drive_kernels import DEVIATION, drive_advance, engine_power

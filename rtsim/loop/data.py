@@ -45,8 +45,6 @@ END_REASONS = {
     END.rotors_fast: "rotor speed above 115 %: faster than can be flown",
 }
 """The same in words."""
-TARGET = Places("airspeed", "airspeed_rate", "altitude", "climb_rate", "nacelle_rate")
-"""What the pilot is asked for, see ``rtsim.pilot.pilot_kernels``. SI."""
 PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
 """Rows of the programme."""
 MOTION = Places("angle", "rate", "acceleration")

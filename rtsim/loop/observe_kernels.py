@@ -14,9 +14,10 @@ from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_n
 from rtsim.frame import QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
-from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, TARGET, Flight
+from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, Flight
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
+from rtsim.pilot.layout_kernels import TARGET
 from rtsim.systems.drive_kernels import DEVIATION, engine_power
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
 

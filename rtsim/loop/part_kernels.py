@@ -12,8 +12,9 @@ from rtsim.atmosphere.gust_kernels import GUST, gust_step
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
-from rtsim.loop.data import CHANNEL, CLOCK, MOTION, STATION, TARGET, Flight
+from rtsim.loop.data import CHANNEL, CLOCK, MOTION, STATION, Flight
 from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
+from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
 from rtsim.protection.law_kernels import law_decide, law_watch
 from rtsim.systems.drive_kernels import DEVIATION, governor_power

@@ -37,7 +37,6 @@ from rtsim.loop.data import (
     MODES,
     MOTION,
     STATION,
-    TARGET,
     PlantTables,
     Scratch,
     ScriptTables,
@@ -58,6 +57,7 @@ from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.nacelle.switch import load_nacelle_tables
+from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
 from rtsim.programme import Programme, ProgrammePoint

@@ -22,11 +22,12 @@ from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
-from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, TARGET, SimulationState, SimulationTables
+from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, SimulationState, SimulationTables
 from rtsim.loop.flying import WHOLE, Flying
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
 from rtsim.lpv.database import Database
+from rtsim.pilot.layout_kernels import TARGET
 from rtsim.programme import Programme
 from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import LAW

@@ -22,7 +22,6 @@ from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 
 COMMAND_ANGLE, ANGLE, RATE = 0, 1, 2
 """Places in the actuator's state [rad, rad, rad/s]."""
-ACTUATOR_STATE_SIZE = 3
 SWITCH_RUNNING, SWITCH_TARGET, SWITCH_HELD, SWITCH_BLOCKED = 0, 1, 2, 3
 """Places in the switch's state: running to a detent (0, 1), its angle [rad], direction held in the last frame
 (-1, 0, 1), waiting for a new press (0, 1)."""

@@ -14,9 +14,9 @@ from rtsim.pilot.layout_kernels import (
     NUMBER,
     OFFSETS,
     PLANT,
-    REF_AIRSPEED,
     S_ESTIMATE,
     S_FILTERED,
+    TARGET,
     PilotTables,
     clip,
     commanded_trim,
@@ -89,7 +89,7 @@ def mocm_engage(
         state[hands_at + hand] = held
     _rest_delay(tables, tables.model_delay_a, state, hands_at, S_ESTIMATE + n)
     _rest_delay(tables, tables.output_delay_a, state, hands_at, delay_at)
-    _start_integrals(tables, cell, state, trim, own[REF_AIRSPEED], errors)
+    _start_integrals(tables, cell, state, trim, own[TARGET.airspeed], errors)
 
 
 @allocating_kernel

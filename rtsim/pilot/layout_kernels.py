@@ -17,18 +17,14 @@ from rtsim.kernels.grid_kernels import bilinear
 from rtsim.kernels.packed import Size
 from rtsim.places import Places
 
-REF_AIRSPEED = 0
-"""Position in ``reference``: filtered airspeed asked for [m/s]."""
-REF_AIRSPEED_RATE = 1
-"""Position in ``reference``: its rate [m/s^2]."""
-REF_ALTITUDE = 2
-"""Position in ``reference``: altitude asked for [m]."""
-REF_CLIMB = 3
-"""Position in ``reference``: its rate [m/s]."""
-REF_NACELLE_RATE = 4
-"""Position in ``reference``: nacelle rate commanded for the frame [rad/s]; the pilot's third channel, not used here."""
-REFERENCE_SIZE = 5
-"""Length of ``reference``."""
+TARGET = Places(
+    "airspeed",  # filtered airspeed asked for [m/s]
+    "airspeed_rate",  # [m/s^2]
+    "altitude",  # [m]
+    "climb_rate",  # [m/s]
+    "nacelle_rate",  # commanded for the frame [rad/s]; the pilot's third channel, not used by the MOCM
+)
+"""Places of what the pilot is asked for, ``reference``."""
 
 LOOP_INTEGRATORS = 0
 """Airspeed and altitude held by integrators inside the design (default)."""
@@ -211,15 +207,15 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
             is scratch.
     """
     count = 1 + tables.roles.hands
-    bilinear(tables, tables.trim, reference[REF_AIRSPEED], nacelle_angle, 4 * count, out)
+    bilinear(tables, tables.trim, reference[TARGET.airspeed], nacelle_angle, 4 * count, out)
     limit = tables.numbers[NUMBER.acceleration_limit]
-    a = min(limit, max(-limit, reference[REF_AIRSPEED_RATE]))
+    a = min(limit, max(-limit, reference[TARGET.airspeed_rate]))
     for k in range(count):
         out[k] += a * (out[count + k] + a * out[2 * count + k])
     # climbing keeps the angle of attack: pitch rises by the path angle, which fades out towards hover
     climb_speed = tables.numbers[NUMBER.climb_speed]
-    speed = reference[REF_AIRSPEED]
-    out[0] += reference[REF_CLIMB] * speed / (speed * speed + climb_speed * climb_speed)
+    speed = reference[TARGET.airspeed]
+    out[0] += reference[TARGET.climb_rate] * speed / (speed * speed + climb_speed * climb_speed)
 
 
 @inner_kernel
@@ -254,9 +250,9 @@ def observe(
     u = x[roles.u]
     w = x[roles.w]
     airspeed = u * cosine + w * sine
-    out[DISPLAY.airspeed] = airspeed - reference[REF_AIRSPEED]
-    out[DISPLAY.altitude] = x[roles.altitude] - reference[REF_ALTITUDE]
-    out[DISPLAY.climb_rate] = u * sine - w * cosine - reference[REF_CLIMB]
+    out[DISPLAY.airspeed] = airspeed - reference[TARGET.airspeed]
+    out[DISPLAY.altitude] = x[roles.altitude] - reference[TARGET.altitude]
+    out[DISPLAY.climb_rate] = u * sine - w * cosine - reference[TARGET.climb_rate]
     out[DISPLAY.pitch] = x[roles.pitch] - pitch
     out[DISPLAY.pitch_rate] = x[roles.q] - pitch_rate
     return float(airspeed)
@@ -278,11 +274,11 @@ def plant_reference(
     cosine = math.cos(trim[0])
     for k in range(roles.plant):
         out[k] = 0.0
-    out[PLANT.u] = reference[REF_AIRSPEED] * cosine + reference[REF_CLIMB] * sine
-    out[PLANT.w] = reference[REF_AIRSPEED] * sine - reference[REF_CLIMB] * cosine
+    out[PLANT.u] = reference[TARGET.airspeed] * cosine + reference[TARGET.climb_rate] * sine
+    out[PLANT.w] = reference[TARGET.airspeed] * sine - reference[TARGET.climb_rate] * cosine
     out[PLANT.q] = pitch_rate
     out[PLANT.pitch] = trim[0]
-    out[PLANT.altitude] = reference[REF_ALTITUDE]
+    out[PLANT.altitude] = reference[TARGET.altitude]
     for hand in range(roles.hands):
         if tables.lags[hand] >= 0:
             out[tables.lags[hand]] = trim[1 + hand]

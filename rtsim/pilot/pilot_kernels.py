@@ -49,12 +49,11 @@ from rtsim.pilot.layout_kernels import (
     NUMBER,
     OFFSETS,
     PLANT,
-    REF_AIRSPEED,
-    REF_AIRSPEED_RATE,
     S_ESTIMATE,
     S_FILTERED,
     S_LIMITED,
     SAME_CONTROL,
+    TARGET,
     PilotTables,
     clip,
     commanded_trim,
@@ -154,8 +153,8 @@ def _known_accelerations(
         if tables.a_columns[c] == PLANT.q:
             for k in range(n):
                 held.plant[k] += cell[rows * c + k] * pitch_rate
-    held.plant[PLANT.u] += own[REF_AIRSPEED_RATE] * math.cos(trim[0])
-    held.plant[PLANT.w] += own[REF_AIRSPEED_RATE] * math.sin(trim[0])
+    held.plant[PLANT.u] += own[TARGET.airspeed_rate] * math.cos(trim[0])
+    held.plant[PLANT.w] += own[TARGET.airspeed_rate] * math.sin(trim[0])
 
 
 @inner_kernel
@@ -172,7 +171,7 @@ def _outer_loops(
     dv = -numbers[NUMBER.kp_v] * held.displays[DISPLAY.airspeed] - numbers[NUMBER.ki_v] * integrals[0]
     dh = -numbers[NUMBER.kp_h] * held.displays[DISPLAY.altitude] - numbers[NUMBER.ki_h] * integrals[1]
     for hand in range(roles.hands):
-        held.command[hand] = outer_command(tables, cell, trim, own[REF_AIRSPEED], dv, dh, hand)
+        held.command[hand] = outer_command(tables, cell, trim, own[TARGET.airspeed], dv, dh, hand)
 
 
 @kernel

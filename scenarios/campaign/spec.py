@@ -16,7 +16,7 @@ from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.strict import Strict, explain
-from rtsim.toml_file import named_text, parse_toml, shipped_names
+from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
 from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
 
@@ -197,11 +197,6 @@ class CampaignFile(_FileOptions, Strict):  # type: ignore[misc]  # made from the
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
     classes: Annotated[list[ClassTable], Field(min_length=1, max_length=1000)]
     expect: list[ExpectRate] = []
-
-
-def campaign_names() -> list[str]:
-    """Names of the campaigns that come with rtsim, sorted."""
-    return shipped_names(LIBRARY)
 
 
 def load_campaign(name_or_path: str | Path) -> tuple[CampaignFile, str]:
