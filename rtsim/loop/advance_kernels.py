@@ -18,8 +18,7 @@ from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
-from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, MODE, PART, PROGRAMME, REFERENCE, STATION, Flight
-from rtsim.loop.observe_kernels import programme_at
+from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, PART, REFERENCE, STATION, Flight
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.protection import law_data as law
@@ -220,7 +219,6 @@ def move_plant(flight: Flight) -> None:
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = acting[CHANNEL.stick]
     u[INPUT.lever] = acting[CHANNEL.lever]
-    before = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
     failing = faults_act(flight)
     if failing:
         call_at(flight.parts[PART.fail], flight)
@@ -231,7 +229,7 @@ def move_plant(flight: Flight) -> None:
     if failing:
         fault_actuators_end(scratch.planned, x)
     after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    state.clock[CLOCK.distance] += dt * (0.5 * (before + after) + tables.wind)
+    state.clock[CLOCK.distance] += dt * (0.5 * (scratch.known[KNOWN.airspeed_in_air] + after) + tables.wind)
     nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
 
 
@@ -240,7 +238,7 @@ def _turn_systems(flight: Flight) -> None:
     """Move flaps and rotor speed to the next frame; the inputs of this one stay as ``observe`` set them."""
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     automatic, governed = state.switches[AUTOMATIC_FLAPS] != 0.0, state.switches[GOVERNOR] != 0.0
-    flap_advance(tables.flaps, state.flaps, automatic, scratch.scheduled[0], tables.dt)
+    flap_advance(tables.flaps, state.flaps, automatic, scratch.known[KNOWN.flap], tables.dt)
     torque = 2.0 * scratch.y[OUTPUT.torque]
     lever = scratch.command[STATION.acting, CHANNEL.lever]
     available = state.faults[FAULT.power] if state.faults[FAULT.engine] != 0.0 else tables.drive.power[-1]
@@ -250,10 +248,9 @@ def _turn_systems(flight: Flight) -> None:
 @inner_kernel
 def move_reference(flight: Flight) -> None:
     """Move the filtered airspeed reference and the frame number on."""
-    tables, state, dt = flight.tables, flight.state, flight.tables.dt
-    time = state.clock[CLOCK.frame] * dt
-    wanted = programme_at(tables.programme, PROGRAMME.airspeed, time)
-    slope = (programme_at(tables.programme, PROGRAMME.airspeed, time + dt) - wanted) / dt
+    tables, state, scratch, dt = flight.tables, flight.state, flight.scratch, flight.tables.dt
+    wanted = scratch.si[QUANTITY.airspeed_command]
+    slope = (scratch.known[KNOWN.airspeed_ahead] - wanted) / dt
     value, value_rate, _ = critically_damped_ramp(
         tables.reference_frequency,
         wanted,

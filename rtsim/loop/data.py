@@ -49,6 +49,9 @@ PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
 """Rows of the programme."""
 MOTION = Places("angle", "rate", "acceleration")
 """The nacelles now [rad, rad/s, rad/s^2]."""
+KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air")
+"""Flap deflection of the schedule [rad]; the programme's airspeed at the end of the frame, and the airspeed at its start
+without gusts [m/s]."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""
@@ -180,8 +183,8 @@ class Scratch(NamedTuple):
     """Nacelle motion over the frame, shape (3, 3)."""
     motion: FloatArray
     """Nacelle angle, rate, acceleration now."""
-    scheduled: FloatArray
-    """Flap deflection of the schedule [rad], shape (1,)."""
+    known: FloatArray
+    """What is known of the frame before its command, ``KNOWN``."""
     flaps: FloatArray
     """Flap deflection less what the aids reckon with, in each interval between settings [rad]."""
     margins: FloatArray

@@ -13,8 +13,9 @@ from rtsim.corridor.corridor_kernels import corridor_margins
 from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
 from rtsim.frame import QUANTITY
 from rtsim.kernels.compiled import inner_kernel
+from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.parts import call_at
-from rtsim.loop.data import CLOCK, MOTION, PART, PROGRAMME, REFERENCE, Flight
+from rtsim.loop.data import CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Flight
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.pilot.layout_kernels import TARGET
@@ -23,29 +24,30 @@ from rtsim.systems.flap_kernels import flap_inputs, flap_now
 
 
 @inner_kernel
-def programme_at(programme: FloatArray, row: int, time: float) -> float:
-    """Value of one row of the programme, linear between its points and held after the last.
+def _programme_at(programme: FloatArray, time: float) -> tuple[int, float]:
+    """Find a time in the programme, which is linear between its points and held before the first and after the last.
 
     Args:
-        programme: The programme's points, shape (4, points).
-        row: 1 airspeed, 2 nacelle angle, 3 altitude.
+        programme: The programme's points, shape (``PROGRAMME.size``, points).
         time: Time [s].
+
+    Returns:
+        Number of the point before it, and the share of the way to the next.
     """
     last = programme.shape[1] - 1
-    if time >= programme[0, last]:
-        return programme[row, last]
-    low = 0
-    high = last
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if programme[0, middle] <= time:
-            low = middle
-        else:
-            high = middle
-    if last == 0:
-        return programme[row, 0]
-    share = (time - programme[0, low]) / (programme[0, high] - programme[0, low])
-    return programme[row, low] + share * (programme[row, high] - programme[row, low])
+    if last == 0 or time >= programme[PROGRAMME.time, last]:
+        return last, 0.0
+    low = cell_below(programme[PROGRAMME.time], time)
+    before, after = programme[PROGRAMME.time, low], programme[PROGRAMME.time, low + 1]
+    return low, (time - before) / (after - before)
+
+
+@inner_kernel
+def _programmed(programme: FloatArray, row: int, low: int, share: float) -> float:
+    """Value of one row of the programme at what ``_programme_at`` found."""
+    if share == 0.0:
+        return programme[row, low]
+    return programme[row, low] + share * (programme[row, low + 1] - programme[row, low])
 
 
 @inner_kernel
@@ -71,13 +73,14 @@ def observe(flight: Flight) -> None:
     state.u[INPUT.gust_q] = gusts[GUST.q]
     speed = math.sqrt((x[STATE.u] + gusts[GUST.u]) ** 2 + (x[STATE.w] + gusts[GUST.w]) ** 2)
     flap_scheduled = nonlinear.flap_schedule(tables.plant.controls, speed, angle)
-    scratch.scheduled[0] = flap_scheduled
+    scratch.known[KNOWN.flap] = flap_scheduled
     flap_inputs(tables.flaps, state.flaps, flap_scheduled, state.u)
     state.u[INPUT.rotor_speed] = state.drive[DEVIATION]
     aircraft = tables.plant.aircraft
     call_at(flight.parts[PART.outputs], aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     through = x[STATE.u] * ct + x[STATE.w] * st
+    scratch.known[KNOWN.airspeed_in_air] = through
     airspeed = through + gusts[GUST.ahead]
     climb = x[STATE.u] * st - x[STATE.w] * ct
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
@@ -98,7 +101,6 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.pitch] = x[STATE.pitch]
     si[QUANTITY.flapping] = math.sqrt(x[STATE.flap_1c] ** 2 + x[STATE.flap_1s] ** 2)
     si[QUANTITY.nacelle_rate] = rate
-    si[QUANTITY.airspeed_command] = programme_at(tables.programme, PROGRAMME.airspeed, time)
     si[QUANTITY.altitude_reference] = scratch.target[TARGET.altitude]
     si[QUANTITY.airspeed_rate] = y[OUTPUT.airspeed_rate]
     si[QUANTITY.ground_speed] = through + tables.wind
@@ -141,13 +143,17 @@ def observe(flight: Flight) -> None:
 def _ask(flight: Flight, time: float) -> None:
     """Fill what the pilot is asked for: filtered airspeed and its rate, altitude and climb rate, nacelle rate."""
     tables, state, scratch = flight.tables, flight.state, flight.scratch
-    target = scratch.target
+    target, programme = scratch.target, tables.programme
+    now, now_share = _programme_at(programme, time)
+    end, end_share = _programme_at(programme, time + tables.dt)
+    scratch.si[QUANTITY.airspeed_command] = _programmed(programme, PROGRAMME.airspeed, now, now_share)
+    scratch.known[KNOWN.airspeed_ahead] = _programmed(programme, PROGRAMME.airspeed, end, end_share)
     target[TARGET.airspeed] = state.reference[REFERENCE.airspeed]
     target[TARGET.airspeed_rate] = state.reference[REFERENCE.rate]
-    target[TARGET.altitude] = programme_at(tables.programme, PROGRAMME.altitude, time)
-    ahead = programme_at(tables.programme, PROGRAMME.altitude, time + tables.dt)
+    target[TARGET.altitude] = _programmed(programme, PROGRAMME.altitude, now, now_share)
+    ahead = _programmed(programme, PROGRAMME.altitude, end, end_share)
     target[TARGET.climb_rate] = (ahead - target[TARGET.altitude]) / tables.dt
-    wanted = programme_at(tables.programme, PROGRAMME.nacelle, time + tables.dt)
+    wanted = _programmed(programme, PROGRAMME.nacelle, end, end_share)
     wanted_rate = (wanted - state.nacelle[0]) / tables.dt
     if tables.automatic.active != 0:
         wanted_rate = call_at(flight.parts[PART.automatic_rate], flight)

@@ -12,7 +12,7 @@ from rtsim.atmosphere.gust_kernels import GUST, gust_step
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
-from rtsim.loop.data import CHANNEL, CLOCK, MOTION, STATION, Flight
+from rtsim.loop.data import CHANNEL, CLOCK, KNOWN, MOTION, STATION, Flight
 from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
@@ -87,7 +87,7 @@ def act_aids(flight: Flight) -> float:
     angle = scratch.motion[MOTION.angle]
     airspeed = aids_airspeed(state.aids, state.switches, scratch.seen)
     expected = flap_schedule(tables.plant.controls, airspeed, angle)
-    flap_parts(tables.flaps, flap_now(state.flaps, scratch.scheduled[0]), expected, scratch.flaps)
+    flap_parts(tables.flaps, flap_now(state.flaps, scratch.known[KNOWN.flap]), expected, scratch.flaps)
     aids_step(
         tables.aids, state.aids, state.switches, scratch.seen, angle, hands, scratch.flaps, aided, tables.dt
     )  # fmt: skip

@@ -22,7 +22,7 @@ from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
-from rtsim.loop.data import CLOCK, END, END_REASONS, MODES, STATION, SimulationState, SimulationTables
+from rtsim.loop.data import CLOCK, END, END_REASONS, KNOWN, MODES, STATION, SimulationState, SimulationTables
 from rtsim.loop.flying import WHOLE, Flying
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
@@ -272,7 +272,7 @@ class Simulation:
     def flap_setting(self) -> float:
         """Deflection that the flaps go to or stand at [rad]."""
         self._observe()
-        return flap_setting(self._state.flaps, float(self._scratch.scheduled[0]))
+        return flap_setting(self._state.flaps, float(self._scratch.known[KNOWN.flap]))
 
     def next_flap_setting(self, step: int) -> float:
         """The published flap setting beyond the present one [rad]; beyond the last one, that one.

@@ -178,7 +178,7 @@ def _roles(
 def _first_auxiliary(database: Database) -> int:
     """Number of the first of the last inputs that are zero in most frames and in every trim."""
     first = len(database.inputs)
-    while first > 0 and database.inputs[first - 1].role in ("flap", "drive"):
+    while first > 0 and database.inputs[first - 1].role in ("gust", "flap", "drive"):
         if np.any(database.u_ref[..., first - 1]):
             break
         first -= 1

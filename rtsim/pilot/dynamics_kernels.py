@@ -14,20 +14,20 @@ from rtsim.pilot.layout_kernels import INTEGRALS, PilotTables, pad4
 
 
 class Gains(NamedTuple):
-    """Interpolated gains of one frame, views into one array."""
+    """Interpolated gains of one frame: flat views into one array, so that the compiler knows every stride."""
 
     A: FloatArray
-    """Columns of the plant's dynamics (columns, padded n)."""
+    """Columns of the plant's dynamics, padded n long."""
     B: FloatArray
-    """Columns of its controls (nu, padded n)."""
+    """Columns of its controls, padded n long."""
     C: FloatArray
-    """Columns of the displays (columns, padded ny)."""
+    """Columns of the displays, padded ny long."""
     F: FloatArray
-    """Columns of the filter gain (ny, padded estimate)."""
+    """Columns of the filter gain, padded estimate long."""
     L: FloatArray
-    """Columns of the commanded-control gain (n + nd, nu)."""
+    """Columns of the commanded-control gain, nu long."""
     G: FloatArray
-    """Inverse neuromotor lag (nu, nu)."""
+    """Inverse neuromotor lag, nu long rows."""
 
 
 class Held(NamedTuple):
@@ -58,7 +58,7 @@ class Motion(NamedTuple):
 
 @inner_kernel
 def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
-    """Look at an interpolated cell as matrices.
+    """Find the gains in an interpolated cell.
 
     Args:
         cell: Interpolated gains.
@@ -73,15 +73,13 @@ def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
     slow = roles.plant + roles.delay
     rows = pad4(roles.plant)
     wide = pad4(slow + hands)
-    a = tables.a_columns.shape[0]
-    c = tables.c_columns.shape[0]
     return Gains(
-        cell[roles.a : roles.a + a * rows].reshape((a, rows)),
-        cell[roles.b : roles.b + hands * rows].reshape((hands, rows)),
-        cell[roles.c : roles.c + c * seen].reshape((c, seen)),
-        cell[roles.f : roles.f + displays * wide].reshape((displays, wide)),
-        cell[roles.l : roles.l + slow * hands].reshape((slow, hands)),
-        cell[roles.g : roles.g + hands * hands].reshape((hands, hands)),
+        cell[roles.a : roles.a + roles.a_columns * rows],
+        cell[roles.b : roles.b + hands * rows],
+        cell[roles.c : roles.c + roles.c_columns * seen],
+        cell[roles.f : roles.f + displays * wide],
+        cell[roles.l : roles.l + slow * hands],
+        cell[roles.g : roles.g + hands * hands],
     )
 
 
@@ -119,9 +117,9 @@ def rates(
     for k in range(rows):
         total = held.plant[k]
         for c in range(roles.a_columns):
-            total += gains.A[c, k] * values[c]
+            total += gains.A[rows * c + k] * values[c]
         for hand in range(hands):
-            total += gains.B[hand, k] * values[roles.a_columns + hand]
+            total += gains.B[rows * hand + k] * values[roles.a_columns + hand]
         dx[k] = total
     if frozen:
         for k in range(n - INTEGRALS, n):
@@ -141,13 +139,13 @@ def rates(
         wanted[hand] = held.command[hand]
     for k in range(n + delay):
         for hand in range(hands):
-            wanted[hand] -= gains.L[k, hand] * x[k]
+            wanted[hand] -= gains.L[hands * k + hand] * x[k]
     for hand in range(hands):
         model = held.limit[hand]
         true = model + held.motor[hand]
         for other in range(hands):
-            model += gains.G[hand, other] * (wanted[other] - x[n + delay + other])
-            true += gains.G[hand, other] * (wanted[other] - u[other])
+            model += gains.G[hands * hand + other] * (wanted[other] - x[n + delay + other])
+            true += gains.G[hands * hand + other] * (wanted[other] - u[other])
         dx[n + delay + hand] = model
         du[hand] = true
     for c in range(roles.c_columns):
@@ -155,12 +153,12 @@ def rates(
     for k in range(seen):
         total = held.displays[k]
         for c in range(roles.c_columns):
-            total -= gains.C[c, k] * values[c]
+            total -= gains.C[seen * c + k] * values[c]
         innovation[k] = total
     for k in range(wide):
         total = dx[k]
         for display in range(roles.displays):
-            total += gains.F[display, k] * innovation[display]
+            total += gains.F[wide * display + k] * innovation[display]
         dx[k] = total
 
 
@@ -184,8 +182,8 @@ def limit_hands(tables: PilotTables, gains: Gains, held: Held, at: Motion, trim:
         for other in range(hands):
             wanted = held.command[other]
             for k in range(tables.roles.plant + tables.roles.delay):
-                wanted -= gains.L[k, other] * at.x[k]
-            rate += gains.G[hand, other] * (wanted - at.u[other])
+                wanted -= gains.L[hands * k + other] * at.x[k]
+            rate += gains.G[hands * hand + other] * (wanted - at.u[other])
         allowed = min(tables.limits[2, hand], max(-tables.limits[2, hand], rate))
         position = trim[1 + hand] + at.u[hand]
         if (position >= tables.limits[1, hand] and allowed > 0.0) or (

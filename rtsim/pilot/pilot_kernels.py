@@ -235,8 +235,6 @@ def mocm_advance_in(
         applied: Stick and lever that act during the frame.
         noise: Standard normals, or none.
     """
-    for k in range(work.shape[0]):
-        work[k] = 0.0
     nacelle_angle, nacelle_rate, dt = scalars
     roles = tables.roles
     n = roles.plant
@@ -258,6 +256,8 @@ def mocm_advance_in(
     first += n
     cell = work[first : first + roles.end]
     first += roles.end
+    for k in range(first, work.shape[0]):
+        work[k] = 0.0
     constant = work[first : first + held_size(tables)]
     held = held_of(tables, constant)
     first += held_size(tables)
@@ -296,7 +296,7 @@ def mocm_advance_in(
         if abs(overruled) > SAME_CONTROL:
             frozen = True
             for k in range(n):
-                held.plant[k] += gains.B[hand, k] * overruled
+                held.plant[k] += gains.B[pad4(n) * hand + k] * overruled
     if noisy:
         root = 1.0 / math.sqrt(dt)
         for k in range(displays):
@@ -304,7 +304,7 @@ def mocm_advance_in(
         for hand in range(hands):
             for other in range(hands):
                 strength = cell[roles.v + displays + other]
-                held.motor[hand] += gains.G[hand, other] * strength * noise[displays + other] * root
+                held.motor[hand] += gains.G[hands * hand + other] * strength * noise[displays + other] * root
 
     # the pilot is linear over a held frame, so RK4 is the Taylor series to fourth order
     holds = frozen and roles.loop == LOOP_INTEGRATORS

@@ -12,7 +12,7 @@ from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
 from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor.boundaries import LEVEL_NAMES
-from rtsim.frame import COLUMN, NACELLES_JAMMED, QUANTITY, UNIT_SCALES
+from rtsim.frame import COLUMN, QUANTITY, UNIT_SCALES
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
@@ -24,6 +24,7 @@ from rtsim.units import DEGREE
 
 SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
 """Quantities of the frame that sensors show under another name."""
+_SENSED = np.array([QUANTITY.asdict()[SHOWN_AS.get(name, name)] for name in Sensors.__slots__ if name != "nacelle_ok"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,8 +230,6 @@ def sensor_array(sensors: Sensors) -> FloatArray:
 
 def sensors_of_rows(rows: FloatArray) -> FloatArray:
     """Sensor values of a frame history (frames)."""
-    places = [getattr(QUANTITY, SHOWN_AS.get(name, name)) for name in Sensors.__slots__ if name != "nacelle_ok"]
     sensors = np.empty((len(rows), SENSOR.size))
-    sensors[:, : len(places)] = rows[:, places] * UNIT_SCALES[places]
-    sensors[:, SENSOR.nacelle_ok] = rows[:, COLUMN.failures].astype(np.int64) & NACELLES_JAMMED == 0
+    monitor_kernels.sensors_of(np.ascontiguousarray(rows), _SENSED, UNIT_SCALES[_SENSED], sensors)
     return sensors

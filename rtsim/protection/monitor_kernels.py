@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtsim.arrays import FloatArray
+from rtsim.arrays import FloatArray, IntArray
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import CorridorTables
+from rtsim.frame import COLUMN, NACELLES_JAMMED
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.places import Places
 from rtsim.protection.law_data import LAW, LAW_MONITOR, WORK_SIZE, ProtectionTables, SinkTables, TorqueTables
@@ -196,6 +197,22 @@ def watch(
     for k in range(sensors.shape[0]):
         limit_margins(tables, sensors[k], time_to_limit[k], margins[k])
         levels_step(tables, margins[k], dt, state, levels[k])
+
+
+@kernel
+def sensors_of(rows: FloatArray, columns: IntArray, scales: FloatArray, sensors: FloatArray) -> None:
+    """Read the sensors of consecutive frames back out of their rows.
+
+    Args:
+        rows: The frames' rows, shape (frames, signals).
+        columns: Column of each sensor, ``nacelle_ok`` excepted, which stands in the bits of the failures.
+        scales: One unit of these columns in SI.
+        sensors: Written, shape (frames, SENSOR.size).
+    """
+    for k in range(rows.shape[0]):
+        for sensor in range(columns.shape[0]):
+            sensors[k, sensor] = rows[k, columns[sensor]] * scales[sensor]
+        sensors[k, SENSOR.nacelle_ok] = 0.0 if int(rows[k, COLUMN.failures]) & NACELLES_JAMMED else 1.0
 
 
 @kernel
