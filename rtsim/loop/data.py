@@ -50,8 +50,8 @@ PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
 MOTION = Places("angle", "rate", "acceleration")
 """The nacelles now [rad, rad/s, rad/s^2]."""
 KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air")
-"""Flap deflection of the schedule [rad]; the programme's airspeed at the end of the frame, and the airspeed at its start
-without gusts [m/s]."""
+"""Flap deflection of the schedule [rad]; airspeed of the programme at the end of the frame, and of the aircraft at its
+start, gusts excepted [m/s]."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""

@@ -237,7 +237,7 @@ def measured(
     """
     sums = new_sums(profile)
     points = np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude])
-    _measure_rows()(np.require(rows, np.float64, ("C", "W")), points, dt, sums)
+    _measure_rows()(np.ascontiguousarray(rows, dtype=np.float64), points, dt, sums)
     sums[SUM.ended], sums[SUM.yielded] = ended, yielded
     return finished(sums, dt)
 

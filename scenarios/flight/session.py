@@ -37,6 +37,9 @@ HAND_WORDS = "your sticks fly"
 GENTLE_END = END_REASONS[END.gentle_landing].split(",", maxsplit=1)[0]
 """How the end reason of a gentle landing begins."""
 
+ROOM_FRAMES = 65_536
+"""Rows of an unpaced flight that lie together in memory, at most."""
+
 
 class FlightSession:
     """Flies a simulation for a number of frames; implements ``rtsim.realtime.source.FrameSource``.
@@ -86,6 +89,7 @@ class FlightSession:
         self._nacelle_law = NacelleLawGuard(nacelle_law) if nacelle_law is not None else None
         self._failure = ""
         self._in_block: tuple[int, int] | None = None
+        self._room = np.empty((0, SIGNAL_COUNT))  # what the next blocks are written to
 
     @property
     def dt(self) -> float:
@@ -160,7 +164,11 @@ class FlightSession:
         by_code = self._hands is not None or self._nacelle_law is not None
         if not by_code and (self._pilot is None or self.simulation.mode != "external"):
             self._in_block = (self.rows, self.simulation.frame_index)
-            rows = self.simulation.run(frames)
+            if len(self._room) < frames:
+                left = self._frames - self.simulation.frame_index
+                self._room = np.empty((max(frames, min(left, ROOM_FRAMES)), SIGNAL_COUNT))
+            rows = self.simulation.run(frames, self._room)
+            self._room = self._room[len(rows) :]
             self._in_block = None
             self.rows += len(rows)
             return rows

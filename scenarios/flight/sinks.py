@@ -122,13 +122,24 @@ class History:
         if self._fill:
             self.chunks.append(self._current[: self._fill])
             self._current, self._fill = np.empty((_CHUNK, SIGNAL_COUNT)), 0
-        if len(rows):
+        if not len(rows):
+            return
+        last = self.chunks[-1] if self.chunks else rows
+        if rows.base is not None and last.base is rows.base and last.ctypes.data + last.nbytes == rows.ctypes.data:
+            # What follows in memory too is joined, so that no copy of a long flight is made in the end.
+            whole = rows.base.reshape(-1, SIGNAL_COUNT)
+            first = (last.ctypes.data - whole.ctypes.data) // whole.strides[0]
+            self.chunks[-1] = whole[first : first + len(last) + len(rows)]
+        else:
             self.chunks.append(rows)
 
     def rows(self) -> FloatArray:
         """All rows, shape (frames, SIGNAL_COUNT), read-only."""
         self.extend(np.empty((0, SIGNAL_COUNT)))
-        whole = np.concatenate(self.chunks) if self.chunks else np.empty((0, SIGNAL_COUNT))
+        if len(self.chunks) == 1:
+            whole = self.chunks[0].view()
+        else:
+            whole = np.concatenate(self.chunks) if self.chunks else np.empty((0, SIGNAL_COUNT))
         whole.flags.writeable = False
         return whole
 
