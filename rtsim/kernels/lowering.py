@@ -15,9 +15,11 @@ from typing import Any
 
 from numba import types
 from numba.core import compiler, compiler_machinery, sigutils, typed_passes, untyped_passes
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
+from numba.core.runtime import rtsys
 
 from rtsim.kernels import progress
 
@@ -119,6 +121,24 @@ class LoweredCompiler(KernelCompiler):
     """The same, stopping before machine code."""
 
 
+class _KernelCache(FunctionCache):
+    """numba's cache, less what only compiling needs."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load what was compiled for a signature.
+
+        numba first registers all that it can compile, which takes ten times longer than to load. Our kernels call
+        nothing of it at run time but the runtime that is started here.
+
+        Args:
+            sig: Types of the arguments.
+            target_context: Where the code goes.
+        """
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
 class WholeDispatcher(CPUDispatcher):
     """A kernel that is called from Python, or at its address; compiled with all that it calls, cached on disk."""
 
@@ -130,7 +150,7 @@ class WholeDispatcher(CPUDispatcher):
             options: Options of ``numba.njit``.
         """
         super().__init__(function, {}, {"nopython": True, "boundscheck": None, **options}, KernelCompiler)
-        self.enable_caching()
+        self._cache = _KernelCache(self.py_func)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile for types, never for a literal's value.
