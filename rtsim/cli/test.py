@@ -97,9 +97,13 @@ def _chosen(paths: list[str]) -> list[Scenario]:
 
 
 def _flown(scenarios: list[Scenario], protection: str | None, options: dict[str, Any]) -> list[Case]:
+    from scenarios.flight.preflight import preflight_problems
     from scenarios.verdicts.tester import Tester, broken_case
 
     tester = Tester(law=protection, **options)
+    for scenario in scenarios:
+        for problem in preflight_problems(scenario.with_options(**options)):
+            raise problem
     cases = []
     with progress("Testing", total=len(scenarios)) as advance:
         for scenario in scenarios:

@@ -28,6 +28,18 @@ _WATCH_FRAMES = 64
 class HandedFlight(SwitchedFlight, Protocol):
     """What the hands need of the flight they are in."""
 
+    by_hand: bool
+    """Whether the mode ``external`` means the sticks of a person, not a plug-in."""
+
+    def switch_pilot(self, pilot: str, *, by_hand: bool = False) -> None:
+        """Hand the controls over.
+
+        Args:
+            pilot: A mode's name, or ``next``.
+            by_hand: ``external`` is the person, also where there is a plug-in.
+        """
+        ...
+
     @property
     def simulation(self) -> Simulation:
         """What flies."""
@@ -91,10 +103,10 @@ class Hands:
         simulation = flight.simulation
         if self._waiting and fresh and (sticks.stick_valid or sticks.lever_valid):
             self._waiting = False
-            if simulation.mode != "external":
-                flight.switch_pilot("external")
+            if not _flies(flight):
+                flight.switch_pilot("external", by_hand=True)
         command = None
-        if simulation.mode == "external":
+        if _flies(flight):
             situation = StickSituation(self._airspeed, self._angle, self._trim_stick(simulation))
             command = self._handler.step(sticks, age=age, situation=situation, dt=simulation.dt)
             state = self._handler.state
@@ -181,8 +193,8 @@ class Hands:
             self._control.reset()
         elif kind == "pilot":
             self._waiting = False
-            if request.name != flight.simulation.mode:
-                flight.switch_pilot(request.name)
+            if request.name != flight.simulation.mode or (request.name == "external" and not flight.by_hand):
+                flight.switch_pilot(request.name, by_hand=True)
         elif kind in {"aid", "flaps", "throttle"}:
             _switch(request, flight)
         elif kind == "parameter":
@@ -190,8 +202,8 @@ class Hands:
             self._handler.change(self._settings)
             flight.tell("parameter", f"{request.name} = {request.value:g}")
         elif kind in {"nacelle", "transition"}:
-            if flight.simulation.mode != "external":
-                flight.switch_pilot("external")
+            if not _flies(flight):
+                flight.switch_pilot("external", by_hand=True)
             if kind == "nacelle":
                 self._handler.go_to(request.value)
             else:
@@ -208,6 +220,11 @@ class Hands:
             self._known_aids = aids
             self._bits = float(sum(1 << place for place, name in enumerate(SWITCHES) if name in aids))
         return self._bits
+
+
+def _flies(flight: HandedFlight) -> bool:
+    """Whether the hands fly."""
+    return flight.simulation.mode == "external" and flight.by_hand
 
 
 def _switch(request: Request, flight: HandedFlight) -> None:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 from rtsim.choices import BUILT_IN_PILOT
 from rtsim.errors import InputError, RtsimError
+from rtsim.loop.options import declared
 from rtsim.toml_file import parse_toml
 from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import load_nacelle_law
@@ -19,10 +23,16 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
     Args:
         scenario: What is to be flown. Modules of MODULE:CLASS are imported.
     """
+    from rtsim.lpv.files.storage import load_database
     from rtsim.protection.laws import load_laws
 
     found = []
-    for key, look_up in (("pilot", load_pilot), ("nacelle", load_nacelle_law), ("protection", load_laws)):
+    named: dict[str, Callable[[str], object]] = {
+        "pilot": load_pilot, "nacelle": load_nacelle_law, "protection": load_laws,
+    }  # fmt: skip
+    if scenario.options.database:  # the shipped one is there, and a flight need not wait for it here
+        named["database"] = load_database
+    for key, look_up in named.items():
         try:
             look_up(getattr(scenario.options, key))
         except InputError as error:
@@ -52,11 +62,11 @@ def start_problems(scenario: Scenario) -> list[InputError]:
     from rtsim.lpv.aircraft import load_aircraft
 
     try:
-        trimmed = (
-            load_aircraft(scenario.options.database or None)
-            .trim(airspeed=start.airspeed, nacelle=start.nacelle_angle)
-            .converged
-        )
+        aircraft = load_aircraft(scenario.options.database or None)
+    except InputError:
+        return []  # which preflight_problems tells
+    try:
+        trimmed = aircraft.trim(airspeed=start.airspeed, nacelle=start.nacelle_angle).converged
     except RtsimError:
         trimmed = False
     if trimmed:
@@ -75,13 +85,16 @@ def start_problems(scenario: Scenario) -> list[InputError]:
 def _placed(error: InputError, scenario: Scenario, key: str) -> InputError:
     """The error where its value stands: in the scenario's file, or else on the command line."""
     table = parse_toml(scenario.source, file=scenario.file).get("flight", {}) if scenario.source else {}
-    if table.get(key) != getattr(scenario.options, key):
+    said, flown = table.get(key), getattr(scenario.options, key)
+    if said != flown and not (
+        declared()[key].is_file and said and (Path(scenario.file).parent / said).resolve() == Path(flown)
+    ):
         return error
     return InputError(
         error.problem,
         file=scenario.file,
         key=f"flight.{key}",
-        value=error.value,
+        value=flown if error.value is None else error.value,
         allowed=error.allowed,
         mend=error.mend,
     )

@@ -14,6 +14,7 @@ from rtsim.arrays import FloatArray
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, history_sha256
+from rtsim.loop.options import declared
 from rtsim.loop.simulation import MODES, Simulation
 from scenarios.files.disturbances import DISTURBANCE_KINDS, disturbance_from_event
 from scenarios.flight.flight_setup import setup_from_json, versions
@@ -188,13 +189,19 @@ def _act_on_law(simulation: Simulation, event: LogEvent) -> None:
 
 def _setup(log: FlightLog) -> Any:
     try:
-        return setup_from_json(log.metadata.setup["flight"])
+        setup = setup_from_json(log.metadata.setup["flight"])
     except (KeyError, TypeError) as error:
         raise InputError(
             f"does not say how it was flown ({error})",
             file=str(log.path),
             mend=f"replay it with the version that wrote it ({log.metadata.versions.get('rtsim', 'unknown')})",
         ) from None
+    # A log that travels takes the files that it names along, beside it.
+    named = {item.name: Path(getattr(setup.options, item.name)).name for item in declared().values() if item.is_file}
+    there = {
+        name: str(log.path.parent / file) for name, file in named.items() if file and (log.path.parent / file).is_file()
+    }
+    return setup.with_options(**there)
 
 
 def _changes(log: FlightLog, database_hash: str) -> tuple[str, ...]:

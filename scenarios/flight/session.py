@@ -88,6 +88,8 @@ class FlightSession:
         self._hands = hands
         self._nacelle_law = NacelleLawGuard(nacelle_law) if nacelle_law is not None else None
         self._failure = ""
+        self.by_hand = hands is not None and pilot_factory is None
+        """Whether the mode ``external`` means the sticks of a person, not the plug-in."""
         self._in_block: tuple[int, int] | None = None
         self._room = np.empty((0, SIGNAL_COUNT))  # what the next blocks are written to
 
@@ -128,13 +130,12 @@ class FlightSession:
         if self._next_failure < len(self._failures):
             self._tell_failures()
         simulation = self.simulation
-        command, scripted = None, False
-        hands = self._hands
+        command, hands = None, self._hands
         if hands is not None:
             command = hands.before(self)
-        elif self._pilot is not None and simulation.mode == "external":
+        if simulation.mode == "external" and not self.by_hand and self._pilot is not None:
             command = self._ask_pilot(self._pilot)
-            scripted = True
+        scripted = command is not None
         if self._nacelle_law is not None and simulation.mode != "hold":
             command = self._tilt(self._nacelle_law, command)
         row = simulation.step(command, scripted=scripted)
@@ -191,12 +192,13 @@ class FlightSession:
         if self._nacelle_law is not None:
             self._nacelle_law.reset()
 
-    def switch_pilot(self, pilot: str) -> None:
+    def switch_pilot(self, pilot: str, *, by_hand: bool = False) -> None:
         """Hand the controls over from the coming frame on.
 
         Args:
-            pilot: ``mocm``, ``external`` (the plug-in), ``hold``, or ``next`` for the next one there is. One that this
-                flight does not have is refused by an event and changes nothing.
+            pilot: ``mocm``, ``external`` (the plug-in, else a person), ``hold``, or ``next`` for the next one there is.
+                One that this flight does not have is refused by an event and changes nothing.
+            by_hand: ``external`` is the person, also where there is a plug-in.
         """
         available = list(pilot_modes(plug_in=self._pilot is not None, hands=self._hands is not None))
         present = self.simulation.mode
@@ -204,7 +206,8 @@ class FlightSession:
             pilot = available[(available.index(present) + 1) % len(available)]
         for mode in available:
             if mode == pilot:
-                by_hand = mode == "external" and self._hands is not None
+                by_hand = mode == "external" and self._hands is not None and (by_hand or self._pilot is None)
+                self.by_hand = by_hand or self._pilot is None
                 self._tell("pilot", HAND_WORDS if by_hand else PILOT_WORDS[mode], {"mode": mode})
                 self.simulation.set_pilot(mode)
                 if mode == "mocm" and "governor" not in self.simulation.aids:

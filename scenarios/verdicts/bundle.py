@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import shlex
 import shutil
 from pathlib import Path
 from typing import Any
 
+from rtsim.aircraft.profile import OWN_SUFFIX
 from rtsim.errors import OutputError
 from rtsim.jsonable import to_jsonable
+from rtsim.loop.options import FlightOptions, declared
 from rtsim.protection.tables import LAW_NAMES
+from scenarios.files.loader import parse_scenario
+from scenarios.files.scenario import Scenario
 from scenarios.flight.flight_setup import versions
 from scenarios.flight.runner import FlightOutputs, fly
 from scenarios.verdicts.tester import Case
@@ -36,16 +41,41 @@ def write_bundle(case: Case, folder: Path) -> Path:
     try:
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)
-        if case.scenario.source:
-            (part / "scenario.toml").write_text(case.scenario.source, encoding="utf-8")
+        text = _complete(case.scenario, part)
         logs = _logs(case, part)
-        verdict = {**case.summary(), "versions": versions(), "logs": logs, "replay": _commands(case, logs)}
+        verdict = {**case.summary(), "versions": versions(), "logs": logs, "replay": _commands(case, text, logs)}
         (part / "verdict.json").write_text(json.dumps(to_jsonable(verdict), indent=1), encoding="utf-8")
         shutil.rmtree(target, ignore_errors=True)
         part.replace(target)
     except OSError as error:
         raise OutputError(f"{target}: cannot be written: {error.strerror or error}.") from error
+    different = [item["log"] for item in logs.values() if not item["same_as_judged"]]
+    if different:
+        raise OutputError(
+            f"{target}: the flight of {' and '.join(different)}, flown again for the bundle, differs from the one that "
+            "was judged. Please report it, with the bundle."
+        )
     return target
+
+
+def _complete(scenario: Scenario, part: Path) -> str:
+    """Write a scenario with every file that it names beside it; give its text, which names them there."""
+    text = scenario.source
+    for item in declared().values():
+        named = getattr(scenario.options, item.name)
+        if not item.is_file or not named:
+            continue
+        file = Path(named)
+        for original in (file, file.with_name(file.stem + OWN_SUFFIX)):
+            if original.is_file():
+                shutil.copyfile(original, part / original.name)
+        # No other key of a scenario is called so; the text may come with quotes of either kind.
+        line = rf"""(\b{item.key}\s*=\s*)("[^"\n]*"|'[^'\n]*')"""
+        if found := re.search(line, text):
+            text = text[: found.start(2)] + json.dumps(file.name, ensure_ascii=False) + text[found.end(2) :]
+    if text:
+        (part / "scenario.toml").write_text(text, encoding="utf-8")
+    return text
 
 
 def _logs(case: Case, part: Path) -> dict[str, Any]:
@@ -69,9 +99,19 @@ def _logs(case: Case, part: Path) -> dict[str, Any]:
     return found
 
 
-def _commands(case: Case, logs: dict[str, Any]) -> list[str]:
-    law = shlex.quote(case.law)
-    options = case.scenario.options
-    database = f" --database {shlex.quote(options.database)}" if options.database else ""
-    commands = [f"rtsim test scenario.toml --protection {law} --plant {options.plant}{database}"]
-    return commands + [f"rtsim replay {item['log']}" for item in logs.values()]
+def _commands(case: Case, text: str, logs: dict[str, Any]) -> list[str]:
+    """What judges the bundle's scenario again as it was judged, and what replays its logs; to be run in its folder."""
+    options, own = case.scenario.options, FlightOptions()
+    if text and (scenario := parse_scenario(text, file="scenario.toml")[0]) is not None:
+        own = scenario.options
+    words = ["rtsim", "test", "scenario.toml", "--protection", case.law]
+    for name, item in declared().items():
+        value, said = (
+            Path(one).name if item.is_file and one else one for one in (getattr(options, name), getattr(own, name))
+        )
+        if value != said and name not in {
+            "protection",
+            "corridor",
+        }:  # the law says the one, and the other follows from it
+            words += [item.flag, str(item.shown(value))]
+    return [shlex.join(words), *(f"rtsim replay {item['log']}" for item in logs.values())]

@@ -171,11 +171,10 @@ class Tester:
         Raises:
             InputError: It cannot be flown.
         """
-        # Tests judge by the flight corridor, with laws and without, unless the scenario names another.
-        scenario = _judged(scenario).with_options(**self._options)
+        scenario = scenario.with_options(**self._options)
         if scenario.trial is None:
             return self._flight_case(scenario)
-        return self._trial_case(scenario, scenario.trial)
+        return self._trial_case(_judged(scenario), scenario.trial)
 
     def _trial_case(self, scenario: Scenario, trial: Trial) -> Case:
         begin = time.perf_counter()
@@ -237,8 +236,9 @@ def plan_of(scenario: Scenario) -> FlightPlan:
 
 
 def _judged(scenario: Scenario) -> Scenario:
-    """The scenario in the corridor that tests judge by."""
-    return scenario.with_options(corridor=scenario.options.corridor or TRIAL_CORRIDOR)
+    """The scenario in the corridor it is judged by: its own; else trials, whatever the law, that of trials."""
+    corridor = TRIAL_CORRIDOR if scenario.trial is not None else None
+    return scenario.with_options(corridor=scenario.options.corridor or corridor)
 
 
 def is_test(scenario: Scenario) -> bool:
@@ -255,9 +255,10 @@ def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
         problem: What kept it from being flown.
     """
     trial = scenario.trial
+    law = law or (trial.law if trial is not None else scenario.options.protection)
     return Case(
         scenario=_judged(scenario),
-        law=law or (trial.law if trial is not None else scenario.options.protection),
+        law=law,
         kind=trial.kind if trial is not None else "flight",
         findings=(),
         metrics={},

@@ -196,10 +196,10 @@ def test_other_mistakes_have_their_exit_codes(folder):
     assert run(folder, "mine.toml", "--junit", "nowhere/j.xml").returncode == 4
 
 
-def test_tests_judge_by_the_flight_corridor_whatever_the_law(folder):
+def test_trials_are_judged_by_the_flight_corridor_whatever_the_law_and_flights_as_they_are_flown(folder):
     ended = run(folder, "typical_conversion", "mine.toml", "--protection", "off", "--json")
     cases = json.loads(ended.stdout.splitlines()[-1])["cases"]
-    assert [case["corridor_name"] for case in cases] == ["flight", "flight"]
+    assert [case["corridor_name"] for case in cases] == ["design", "flight"]
     flown = {item["metric"] for item in cases[0]["expectations"]}
     assert {"completed", "corridor.exceedances"} <= flown
 
