@@ -193,7 +193,9 @@ def _invoke(arguments: Sequence[str] | None) -> int:
         if isinstance(end.__context__, BrokenPipeError):
             raise end.__context__ from None
         return end.code if isinstance(end.code, int) else int(end.code is not None)
-    except typer.Abort:
+    except typer.Abort as abort:
+        if isinstance(abort.__cause__ or abort.__context__, EOFError):  # for the parser that is Ctrl-C too
+            raise (abort.__cause__ or abort.__context__) from None  # type: ignore[misc]
         return EXIT_INTERRUPTED
     except RuntimeError as end:
         if isinstance(end, typer.Exit):

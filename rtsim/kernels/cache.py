@@ -10,6 +10,7 @@ Legend:
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
@@ -59,24 +60,27 @@ def source_hash(root: Path) -> str:
 
 
 def cache_folder(root: Path) -> Path | None:
-    """The folder for kernels of these sources, made if need be.
+    """The folder for kernels of these sources, made if need be, which may be read-only.
+
+    It lies in ``NUMBA_CACHE_DIR`` if that is set, else in ``rtsim/kernels`` of the user's cache.
 
     Returns:
-        The folder, or None where the user has chosen another (``NUMBA_CACHE_DIR``) or none can be written.
+        The folder; None where there is none and none can be made.
     """
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return None
+    own, chosen = os.environ.get("NUMBA_CACHE_DIR"), os.environ.get("XDG_CACHE_HOME")
     try:
-        chosen = os.environ.get("XDG_CACHE_HOME")
-        parent = (Path(chosen) if chosen else Path.home() / ".cache") / "rtsim" / "kernels"
+        parent = Path(own) if own else (Path(chosen) if chosen else Path.home() / ".cache") / "rtsim" / "kernels"
         folder = parent / source_hash(root)
         if not folder.is_dir():
             folder.mkdir(parents=True, exist_ok=True)
-            _forget_old(parent)
-        os.utime(folder)
-        return folder if os.access(folder, os.W_OK) else None
+            if not own:
+                _forget_old(parent)
+        with contextlib.suppress(OSError):
+            os.utime(folder)
+        next(folder.iterdir(), None)  # one that cannot be looked into is none
     except (OSError, RuntimeError):  # RuntimeError: there is no home
         return None
+    return folder
 
 
 def _forget_old(parent: Path) -> None:

@@ -1,7 +1,7 @@
 """How kernels are compiled: one decorator for all of them.
 
 numpy's division semantics spare a check at every division (the rotor's blade elements run four times faster), the
-machine code is cached on disk (``rtsim.kernels.cache``), and ``fastmath`` stays off: results are bit-reproducible on
+machine code is kept on disk (``rtsim.kernels.store``), and ``fastmath`` stays off: results are bit-reproducible on
 one machine type.
 """
 
@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import os
 from collections.abc import Callable
-from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
@@ -18,12 +17,7 @@ import numba
 from numba.extending import typeof_impl
 
 from rtsim.kernels import place_type as place_type  # noqa: PLC0414 - teaches numba the places
-from rtsim.kernels.cache import cache_folder
-
-_folder = cache_folder(Path(__file__).resolve().parents[2])
-if _folder is not None:
-    _configuration: Any = numba.config  # its names are made at run time
-    _configuration.CACHE_DIR = str(_folder)
+from rtsim.kernels.store import writable_folder
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -66,7 +60,10 @@ class Kernel:
                 kind = LoweredDispatcher if self._lowered else WholeDispatcher
                 self._dispatcher = kind(self.py_func, **self._options)
             else:
-                self._dispatcher = numba.njit(cache=True, **self._options)(self.py_func)
+                folder = writable_folder()
+                configuration: Any = numba.config  # its names are made at run time
+                configuration.CACHE_DIR = str(folder or "")
+                self._dispatcher = numba.njit(cache=folder is not None, **self._options)(self.py_func)
         return self._dispatcher
 
     def __call__(self, *arguments: Any) -> Any:

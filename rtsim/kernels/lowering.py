@@ -11,17 +11,27 @@ bit for bit, only later. Measured: docs/performance.md; why: docs/decisions/0013
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
+import pickle
+import sys
+from pathlib import Path
 from typing import Any
 
+import numba
+import numpy as np
 from numba import types
 from numba.core import compiler, compiler_machinery, sigutils, typed_passes, untyped_passes
-from numba.core.caching import FunctionCache
+from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 
-from rtsim.kernels import progress
+from rtsim.kernels import progress, store
+
+_SOURCES = Path(__file__).resolve().parents[2]
 
 
 class LoweredLibrary(JITCodeLibrary):
@@ -121,22 +131,59 @@ class LoweredCompiler(KernelCompiler):
     """The same, stopping before machine code."""
 
 
-class _KernelCache(FunctionCache):
-    """numba's cache, less what only compiling needs."""
+class _KernelCache(NullCache):
+    """Keeps machine code with the other pieces of ``rtsim.kernels.store``, one file for a kernel and its types."""
+
+    def __init__(self, function: Any) -> None:
+        """Say what the files are called by.
+
+        Args:
+            function: The kernel.
+        """
+        code, cells = function.__code__, function.__closure__ or ()
+        made_from = [code.co_code, dumps(tuple(cell.cell_contents for cell in cells))]
+        if not Path(code.co_filename).is_relative_to(_SOURCES):  # ours are part of the folder's name
+            with contextlib.suppress(OSError):
+                stat = Path(code.co_filename).stat()
+                made_from.append(repr((code.co_filename, code.co_firstlineno, stat.st_mtime_ns, stat.st_size)).encode())
+        self._made_from = b"".join(made_from)
+        self._name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+
+    def _file(self, sig: Any, codegen: Any) -> str:
+        types_of = ", ".join(str(one) for one in sigutils.normalize_signature(sig)[0])
+        made_by = repr((types_of, codegen.magic_tuple(), numba.__version__, sys.version_info, np.__version__))
+        return f"{self._name}-{hashlib.sha256(self._made_from + made_by.encode()).hexdigest()[:16]}.kernel"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Load what was compiled for a signature.
 
-        numba first registers all that it can compile, which takes ten times longer than to load. Our kernels call
-        nothing of it at run time but the runtime that is started here.
+        numba would first register all that it can compile, which takes ten times longer than to load. Our kernels
+        call nothing of it at run time but the runtime that is started here.
 
         Args:
             sig: Types of the arguments.
             target_context: Where the code goes.
         """
         rtsys.initialize(target_context)
-        with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+        file = self._file(sig, target_context.codegen())
+        content = store.read(file)
+        if content is None:
+            return None
+        try:
+            return compiler.CompileResult._rebuild(target_context, *pickle.loads(content))
+        except Exception:  # noqa: BLE001 - whatever it is that this numba cannot do with it: it is compiled anew
+            store.damaged(file)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled.
+
+        Args:
+            sig: Types of the arguments.
+            data: The result.
+        """
+        if not data.library.has_dynamic_globals:
+            store.write(self._file(sig, data.codegen), dumps(data._reduce()))
 
 
 class WholeDispatcher(CPUDispatcher):

@@ -16,25 +16,15 @@ from typing import Any
 
 import numba
 
-from rtsim.kernels import progress
+from rtsim.kernels import progress, store
 
+_CONFIGURATION: Any = numba.config  # its names are made at run time
 CHILD = "RTSIM_COMPILES_BESIDE"
 """Set in the environment of the process beside."""
 KERNELS_ALONE, KERNELS_BESIDE = 107, 69
 """Kernels that a first flight of the LPV aircraft compiles: alone, and with a process beside it."""
 _wanted: list[str] = []
 _running: list[subprocess.Popen[bytes]] = []
-
-
-def marker(plant: str) -> Path | None:
-    """File that stands in the kernel cache once a flight of this plant has been compiled; None where nothing is kept.
-
-    Args:
-        plant: Aircraft model.
-    """
-    configuration: Any = numba.config  # its names are made at run time
-    folder = configuration.CACHE_DIR
-    return Path(folder) / f"compiled-{plant}" if folder and not configuration.DISABLE_JIT else None
 
 
 def also(compile_it: str) -> None:
@@ -53,11 +43,10 @@ def start(plant: str) -> None:
     Args:
         plant: ``lpv`` or ``nonlinear``.
     """
-    place = marker(plant)
-    if _running or (place is not None and place.exists()) or CHILD in os.environ:
+    if _running or CHILD in os.environ or _CONFIGURATION.DISABLE_JIT or store.read(_marker(plant)) is not None:
         return
     progress.expect(KERNELS_ALONE)
-    if place is None or (os.cpu_count() or 1) < 2:
+    if (os.cpu_count() or 1) < 2 or store.writable_folder() is None:
         return
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
@@ -86,10 +75,13 @@ def finish(plant: str) -> None:
     for process in _running:
         process.wait()
     _running.clear()
-    place = marker(plant)
-    if place is not None and CHILD not in os.environ and not place.exists():
-        with contextlib.suppress(OSError):
-            place.touch()
+    if CHILD not in os.environ and not _CONFIGURATION.DISABLE_JIT and store.read(_marker(plant)) is None:
+        store.write(_marker(plant), b"")
+
+
+def _marker(plant: str) -> str:
+    """Piece that is kept once a flight of a plant has been compiled."""
+    return f"compiled-{plant}"
 
 
 def _end() -> None:

@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba import config
 
 from rtsim.kernels import kept as keeping
-from rtsim.kernels import progress
+from rtsim.kernels import progress, store
 from rtsim.kernels.compiled import inner_kernel, interpreted, kernel, part
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Address, Packed, Size, packed
@@ -203,7 +202,7 @@ def test_plain_numba_compiles_to_the_same_bits(tmp_path):
 
 
 def test_a_kept_piece_is_made_once_and_again_when_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(store, "main_folder", lambda: tmp_path)
     made = []
 
     def make():
@@ -224,19 +223,12 @@ def test_a_kept_piece_is_made_once_and_again_when_damaged(tmp_path, monkeypatch)
 
 
 def test_only_the_pieces_used_last_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(store, "main_folder", lambda: tmp_path)
     for number in range(6):
         kept("piece", bytes([number]), lambda: 1)
         kept("another", b"", lambda: 1)
     assert len(list(tmp_path.glob("piece-*.kept"))) == keeping.KEPT
     assert len(list(tmp_path.glob("another-*.kept"))) == 1
-
-
-def test_nothing_is_kept_where_nothing_can_be_written(monkeypatch):
-    monkeypatch.setattr(config, "CACHE_DIR", "/nowhere/at/all")
-    assert kept("piece", b"", lambda: 5) == 5
-    monkeypatch.setattr(config, "CACHE_DIR", "")
-    assert kept("piece", b"", lambda: 6) == 6
 
 
 def test_compiling_is_told_and_nothing_else():
