@@ -16,7 +16,7 @@ from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
 from rtsim.jsonable import to_jsonable
-from rtsim.whole_file import whole_file, write_whole
+from rtsim.whole_file import check_writable, whole_file, write_whole
 
 if TYPE_CHECKING:
     from scenarios.campaign.executors import Executor
@@ -65,6 +65,9 @@ def run_campaign_command(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Fly a campaign: drawn flights, each with every law and without; exit 1 where an expectation does not hold."""
+    for file, folder in ((out, True), (junit, False)):
+        if file is not None:
+            check_writable(file, folder=folder)
     from scenarios.campaign.chunks import plan_chunks
     from scenarios.campaign.run import CampaignOptions, run_campaign
     from scenarios.campaign.spec import load_campaign

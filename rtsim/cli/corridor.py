@@ -10,7 +10,7 @@ import typer
 
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
-from rtsim.whole_file import whole_file
+from rtsim.whole_file import check_writable, whole_file
 
 if TYPE_CHECKING:
     from rtsim.command import Margins
@@ -42,6 +42,8 @@ def corridor_command(
     plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
 ) -> None:
     """Show the boundaries and centre line of the conversion corridor; with a point, its margins."""
+    if plot is not None:
+        check_writable(plot)
     from rtsim.corridor.boundaries import load_corridor
     from rtsim.units import deg, kt
 

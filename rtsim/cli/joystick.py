@@ -10,6 +10,7 @@ import typer
 
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
+from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
     from telemetry.joystick.gamepad import Gamepad
@@ -185,6 +186,7 @@ def _run_wizard(path: Path, wanted: str | None) -> None:
 
     if path.suffix != ".toml":
         raise InputError("must end in .toml", key="--wizard", value=str(path), mend="name it FILE.toml")
+    check_writable(path)
     gamepad = Gamepad(wanted)
     try:
         console.print(f"{gamepad.name}: let everything go.", markup=False)

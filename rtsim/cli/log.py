@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.output import console, emit_json, results
+from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
     from telemetry.log.reader import FlightLog
@@ -35,8 +36,9 @@ def plot_command(
     from telemetry.log.flight_plots import plot_flight
     from telemetry.log.reader import read_log
 
-    flight = read_log(log)
-    files = plot_flight(flight, out or log.with_name(f"{log.stem}-plots"))
+    folder = out or log.with_name(f"{log.stem}-plots")
+    check_writable(folder, folder=True)
+    files = plot_flight(read_log(log), folder)
     if json:
         emit_json({"log": log, "files": files})
         return
@@ -66,6 +68,7 @@ def export_command(
     from telemetry.log.export import export_log
     from telemetry.log.reader import read_log
 
+    check_writable(target)
     flight = read_log(log)
     export_log(flight, target)
     if json:

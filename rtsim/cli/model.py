@@ -9,6 +9,7 @@ import typer
 
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import InputError
+from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,6 +54,7 @@ def build_command(
 
     target = out if out is not None else SHIPPED
     _require_suffix(target)
+    check_writable(target)
     with progress("Solving trims and linear models", total=1.0) as advance:
         database = _built(jobs, without_pilot, advance)
     save_database(database, target)
@@ -114,6 +116,7 @@ def export_command(
     from rtsim.lpv.files.storage import load_database, save_database
 
     _require_suffix(file)
+    check_writable(file)
     save_database(load_database(database), file)
     console.print(f"Wrote {file}", soft_wrap=True)
 
@@ -140,6 +143,7 @@ def import_command(
     target = out if out is not None else file.with_name(f"{file.stem}.rtsim.nc")
     if target.suffix.lower() != ".nc":
         raise InputError("not the name of a NetCDF file", key="--out", value=str(target), mend="end it in .nc")
+    check_writable(target)
     database = load_database(file)
     if design_pilots:
         with progress("Designing the pilots", total=1.0) as advance:

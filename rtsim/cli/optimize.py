@@ -12,7 +12,7 @@ import typer
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
-from rtsim.whole_file import write_whole
+from rtsim.whole_file import check_writable, write_whole
 
 if TYPE_CHECKING:
     from rtsim.optimization.path import ConversionPath
@@ -89,9 +89,9 @@ def optimize_command(
     scenario_file = out if out is not None else Path(f"{chosen.name}.toml")
     if scenario_file.suffix != ".toml":
         raise InputError("must end in .toml", key="--out", value=str(scenario_file))
-    if not scenario_file.parent.is_dir():
-        raise InputError("its directory does not exist", key="--out", value=str(scenario_file), mend="create it")
     record_file = scenario_file.with_suffix(".search.npz")
+    for file in (scenario_file, record_file):
+        check_writable(file)
     if resume and not record_file.exists():
         raise InputError("there is no record to resume from", key="--resume", value=str(record_file))
 

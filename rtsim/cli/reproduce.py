@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rtsim.cli.output import emit_json, progress, results
+from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
     from scenarios.reproduction.run import Reproduction
@@ -34,6 +35,7 @@ def reproduce_command(
     """
     from scenarios.reproduction.run import reproduce, total_work
 
+    check_writable(out, folder=True)
     file = "" if database is None else str(database.resolve())
     with progress("Flying the paper", total=total_work()) as advance:
         done = reproduce(out, jobs=jobs if jobs is not None else os.cpu_count() or 1, progress=advance, database=file)

@@ -9,8 +9,8 @@ import typer
 
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
-from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError, RtsimError
-from rtsim.whole_file import write_whole
+from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, RtsimError
+from rtsim.whole_file import check_writable, write_whole
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
@@ -42,9 +42,15 @@ def run_tests(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails."""
-    for file in (junit, html):
-        _check_writable(file)
+    for file, folder in ((junit, False), (html, False), (out, True)):
+        if file is not None:
+            check_writable(file, folder=folder)
     scenarios = _chosen(paths or [])
+    if out is not None:
+        from scenarios.verdicts.bundle import check_bundle
+
+        for scenario in scenarios:
+            check_bundle(scenario.name, out)
     cases = _flown(scenarios, protection, options)
     if junit is not None:
         _write_junit(cases, junit)
@@ -192,9 +198,3 @@ def _print(cases: list[Case]) -> None:
             results.print(f"{case.name}: {word}", markup=False, soft_wrap=True)
     failed = sum(case.verdict != "passed" for case in cases)
     results.print(f"{len(cases) - failed} of {len(cases)} passed")
-
-
-def _check_writable(path: Path | None) -> None:
-    """A report that cannot be written is better known before the flights than after."""
-    if path is not None and (path.is_dir() or not path.absolute().parent.is_dir()):
-        raise OutputError(f"{path}: cannot be written: its folder does not exist or it is one itself.")

@@ -10,6 +10,7 @@ import typer
 from rtsim.cli.flight_text import say
 from rtsim.cli.output import emit_json, results
 from rtsim.errors import InputError
+from rtsim.whole_file import check_writable, whole_file
 
 if TYPE_CHECKING:
     from rtsim.realtime.report import TimingLog, TimingReport
@@ -35,6 +36,8 @@ def timing_command(
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Fly the hover in real time and report lateness, work, overruns and drift."""
+    if plot is not None:
+        check_writable(plot)
     from rtsim.loop.options import declared
 
     if not 0.1 <= duration <= 3600.0:
@@ -133,7 +136,6 @@ def _draw(log: TimingLog, path: Path, rate: int) -> None:
     import numpy as np
 
     from rtsim.realtime.report import microseconds
-    from rtsim.whole_file import whole_file
 
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), layout="constrained", sharey=True)
     edges = np.logspace(-1, 5, 121)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import re
+import secrets
 import shlex
 import shutil
 from pathlib import Path
@@ -21,6 +23,9 @@ from scenarios.flight.flight_setup import versions
 from scenarios.flight.runner import FlightOutputs, fly
 from scenarios.verdicts.tester import Case
 
+VERDICT = "verdict.json"
+"""What a bundle says about itself; ``files`` are the names that it holds."""
+
 
 def write_bundle(case: Case, folder: Path) -> Path:
     """Write the bundle of a case.
@@ -36,19 +41,23 @@ def write_bundle(case: Case, folder: Path) -> Path:
     Raises:
         OutputError: It cannot be written.
     """
+    check_bundle(case.name, folder)
     target = folder / case.name
-    part = folder / f".{case.name}.part"
+    part = folder / f".{case.name}.{secrets.token_hex(8)}.part"
     try:
-        shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)
         text = _complete(case.scenario, part)
         logs = _logs(case, part)
+        files = sorted(item.name for item in part.iterdir())
         verdict = {**case.summary(), "versions": versions(), "logs": logs, "replay": _commands(case, text, logs)}
-        (part / "verdict.json").write_text(json.dumps(to_jsonable(verdict), indent=1), encoding="utf-8")
+        content = json.dumps(to_jsonable({**verdict, "files": [*files, VERDICT]}), indent=1)
+        (part / VERDICT).write_text(content, encoding="utf-8")
         shutil.rmtree(target, ignore_errors=True)
         part.replace(target)
     except OSError as error:
         raise OutputError(f"{target}: cannot be written: {error.strerror or error}.") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
     different = [item["log"] for item in logs.values() if not item["same_as_judged"]]
     if different:
         raise OutputError(
@@ -56,6 +65,31 @@ def write_bundle(case: Case, folder: Path) -> Path:
             "was judged. Please report it, with the bundle."
         )
     return target
+
+
+def check_bundle(name: str, folder: Path) -> None:
+    """Refuse a place for a bundle where something stands that is no bundle, or more than one.
+
+    Args:
+        name: Name of the scenario.
+        folder: Where bundles go.
+
+    Raises:
+        OutputError: Something of somebody else's would be lost.
+    """
+    target = folder / name
+    if not os.path.lexists(target):
+        return
+    try:
+        known = set(json.loads((target / VERDICT).read_text(encoding="utf-8"))["files"])
+        foreign = sorted({item.name for item in target.iterdir()} - known)
+    except (OSError, ValueError, KeyError, TypeError):
+        foreign = [""]
+    if foreign or target.is_symlink():
+        raise OutputError(
+            f"{target}: a bundle cannot be written here: {foreign[0] or 'what stands there'} is not of an earlier one; "
+            "move it away, or choose another folder."
+        )
 
 
 def _complete(scenario: Scenario, part: Path) -> str:
