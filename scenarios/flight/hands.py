@@ -113,6 +113,7 @@ class Hands:
                 self._link.input.first_use_age,
                 self._aid_bits(simulation.aids),
                 float(handler.transition),
+                waiting=float(handler.waiting if simulation.mode == "external" else 0),
             )
         )
         return command

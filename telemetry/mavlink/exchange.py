@@ -17,7 +17,7 @@ from telemetry.exchange.shared_memory import WORD, Queue, SequenceLock
 
 _MAGIC = 0x5254_5349_4D4D_4156
 _HEADER_WORDS = 32
-_STICK_COUNT = 12
+_STICK_COUNT = 14
 _REQUEST = struct.Struct("<16s24sd")
 _REQUEST_SLOTS = 256
 _TEXT = struct.Struct("<B55s")
@@ -67,6 +67,8 @@ class Feedback(NamedTuple):
     """Transition under way: 0 none, 3 to helicopter, 4 to airplane."""
     ended: float = 0.0
     """1 once the flight is over."""
+    waiting: float = 0.0
+    """Controls that stay where they are until their hand moves through them: 1 the stick, 2 the lever."""
 
 
 # Offsets in bytes; every part begins on a word.
@@ -148,6 +150,8 @@ class Exchange:
                 float(sticks.trim),
                 float(sticks.buttons),
                 float(sticks.owner),
+                float(sticks.stream),
+                float(sticks.overridden),
             )
         )
 
@@ -156,7 +160,7 @@ class Exchange:
         values = self._stick.read()
         if values is None:
             return None
-        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, trim, buttons, owner = values
+        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, *whole = values
         bits = int(valid)
         return StickInput(
             int(sequence),
@@ -169,9 +173,7 @@ class Exchange:
             bool(bits & 2),
             int(switch),
             angle,
-            int(trim),
-            int(buttons),
-            int(owner),
+            *map(int, whole),
         )
 
     def write_feedback(self, feedback: Feedback) -> None:

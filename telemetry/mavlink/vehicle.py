@@ -25,7 +25,7 @@ from telemetry.mavlink.exchange import (
     Exchange,
 )
 from telemetry.mavlink.framing import Frame, SignatureCheck, decode, frames
-from telemetry.mavlink.notices import INFO, WARNING
+from telemetry.mavlink.notices import INFO, NOTICE, WARNING
 from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import (
     FLAP_COMMAND,
@@ -77,7 +77,7 @@ class Vehicle(Outbox):
         self._decoder = dialect.MAVLink(None)
         self._identity: tuple[int, ...] = ()
         self._vtol_state = 0
-        self._input_state = 0
+        self._input_state = self._waiting = 0
         if config.parameter_file:
             self._load_parameters(config.parameter_file)
 
@@ -261,6 +261,12 @@ class Vehicle(Outbox):
         elif present == INPUT_LIVE and self._input_state == INPUT_LOST:
             self.board.say(INFO, "Sticks regained")
         self._input_state = present
+        waiting, self._waiting = self._waiting, int(self.state.feedback.waiting)
+        if self._waiting & ~waiting & 2:
+            lever = 100.0 * self.state.feedback.lever
+            self.board.say_seldom("lever", NOTICE, f"Lever stays at {lever:.0f} %: move yours through it", self.now)
+        if self._waiting & ~waiting & 1:
+            self.board.say_seldom("stick", NOTICE, "Stick stays at trim: centre yours first", self.now)
 
     def _look_after_peers(self, now: float) -> None:
         owner = self.lock.owner

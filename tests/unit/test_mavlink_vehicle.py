@@ -674,6 +674,81 @@ def test_rc_override(bench):
     assert bench.vehicle.reader.ignored_axes == 2
 
 
+NOT_OURS = {f"chan{number}_raw": 1500 for number in range(9, 19)}
+"""What QGroundControl sends beside MANUAL_CONTROL: channels from 9 on."""
+
+
+@pytest.mark.parametrize("ignored", [[65535] * 8, [65534] * 8, [65535, 0, 65534, 0, 65535, 65535, 1700, 1200]])
+def test_an_override_that_carries_none_of_our_channels_touches_nothing(bench, ignored):
+    """A held button acts once, held trim and axes go on, and it neither takes the sticks nor keeps them alive."""
+    bench.send(override(*ignored, **NOT_OURS), address=OTHER)
+    assert bench.vehicle.lock.owner is None
+    assert bench.exchange.read_sticks().sequence == 0
+    for number in range(50):
+        bench.send(manual(x=300, z=700, buttons=1 << 6 | 1 << 9 | 1 << 11 | 1 << 5))
+        bench.send(override(*ignored, **NOT_OURS))
+        sticks = bench.exchange.read_sticks()
+        assert (sticks.stick, sticks.lever, sticks.trim, sticks.nacelle_switch) == (0.3, 0.7, 1, -1), number
+        bench.fly(0.02)
+    assert bench.requests() == [Request("aid", "rate_damping", 2.0), Request("pilot", "next")]
+    last = bench.exchange.read_sticks().received_ns
+    for _ in range(50):
+        bench.fly(0.06)
+        bench.send(override(*ignored, **NOT_OURS))
+    assert bench.exchange.read_sticks().received_ns == last
+    assert bench.vehicle.lock.owner is None
+
+
+def test_an_override_takes_the_channels_it_carries_and_gives_them_back(bench):
+    bench.send(manual(x=300, z=700, buttons=1 << 4))
+    bench.send(override(65535, 65535, 1400))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.stick, sticks.lever, sticks.nacelle_switch) == (0.3, pytest.approx(0.4), 1)
+    assert sticks.overridden == 2
+    bench.send(manual(x=310, z=710))
+    assert bench.exchange.read_sticks().lever == pytest.approx(0.4)
+    bench.send(override(65535, 65535, 0))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lever, sticks.overridden) == (0.71, 0)
+    bench.send(override(65535, 65535, 1400))
+    bench.fly(0.6)  # an override that is not repeated ends
+    bench.send(manual(x=310, z=720))
+    assert bench.exchange.read_sticks().lever == 0.72
+
+
+def test_a_channel_or_button_that_is_no_longer_sent_ends_though_others_go_on(bench):
+    bench.send(manual(x=300, z=700, buttons=1 << 5))
+    bench.send(override(65535, 1400, 1600))
+    for _ in range(40):
+        bench.fly(0.02)
+        bench.send(override(65535, 65535, 1600))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.stick_valid, sticks.lever_valid, sticks.nacelle_switch, sticks.buttons) == (False, True, 0, 0)
+
+
+def test_another_pilot_and_input_that_is_back_are_other_streams(bench):
+    bench.send(manual())
+    streams = [bench.exchange.read_sticks().stream]
+    bench.fly(0.1)
+    bench.send(manual())
+    assert bench.exchange.read_sticks().stream == streams[0] > 0
+    bench.fly(0.7)
+    bench.send(manual())
+    streams.append(bench.exchange.read_sticks().stream)
+    bench.fly(2.2)
+    bench.send(manual(), address=OTHER)
+    streams.append(bench.exchange.read_sticks().stream)
+    assert len(set(streams)) == 3
+
+
+def test_controls_that_wait_for_their_hand_are_told(bench):
+    bench.feedback = bench.feedback._replace(waiting=3.0, lever=0.73)
+    bench.fly(1.0)
+    texts = bench.texts()
+    assert any("Lever stays at 73 %" in text for text in texts)
+    assert any("centre yours" in text for text in texts)
+
+
 def test_the_first_pilot_owns_the_sticks_until_it_is_silent(bench):
     bench.send(manual(x=100))
     bench.send(manual(x=900), address=OTHER)  # the same ids from another address are another program
