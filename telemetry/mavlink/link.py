@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,6 +122,8 @@ class MavlinkLink:
             read_signing_key(config.signing_key_file)  # a wrong key is told here, not by a process in the background
         self.failure: OutputError | None = None
         """Why there is no MAVLink any more, once that is so; the flight itself goes on."""
+        self.on_note: Callable[[str], object] | None = None
+        """Told what the MAVLink process finds worth an event of the flight."""
         self.restarts = 0
         """How often the process had to be started again."""
         self._ring = Ring(RING_ROWS)
@@ -191,6 +194,9 @@ class MavlinkLink:
         if self._closed or self.failure is not None or now - self._watched < _WATCH_PERIOD_S:
             return
         self._watched = now
+        for note in self._exchange.take_notes():
+            if self.on_note is not None:
+                self.on_note(note)
         life_sign = int(self._exchange.header[HEARTBEAT])
         if life_sign != self._life_sign or not self._exchange.header[READY]:
             self._life_sign, self._life_sign_at = life_sign, now

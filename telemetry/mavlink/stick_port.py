@@ -57,7 +57,7 @@ class StickPort:
             if outbox.lock.allowed(frame.system_id):
                 board.say_seldom(f"refused {pilot}", WARNING, f"Sticks are held by {before}, not {pilot}", now)
             else:
-                board.say_seldom("whitelist", WARNING, f"System {frame.system_id} may not fly", now)
+                outbox.tell_once(frame.system_id, f"System {frame.system_id} may not fly")
             return
         silent = received_ns - outbox.reader.sticks.received_ns > lasts_ns
         if silent or pilot != self._pilot:  # what was held before must not come back with the first packet

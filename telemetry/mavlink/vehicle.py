@@ -35,7 +35,7 @@ from telemetry.mavlink.parameters import (
     WARNINGS,
     ParameterStore,
 )
-from telemetry.mavlink.peers import Address, Peer
+from telemetry.mavlink.peers import MOST_PEERS, Address, Peer
 from telemetry.mavlink.services import Services
 from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST
 from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
@@ -43,7 +43,8 @@ from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
 LONGEST_PAUSE_S = 0.02
 """Changes in the flight are noticed at least this often [s]."""
 _LIST_PAUSE_S = 0.004
-_GROUND_HEARTBEAT, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 11, 75, 76
+_CHALLENGE_S = 0.3
+_GROUND_HEARTBEAT, _PING, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 4, 11, 75, 76
 
 
 class Vehicle(Outbox):
@@ -69,6 +70,7 @@ class Vehicle(Outbox):
         self._stick_port = StickPort(self)
         self._answers = {
             **self.services.answers,
+            _PING: self._take_ping,
             _SET_MODE: self._take_set_mode,
             _COMMAND_INT: self._take_command,
             _COMMAND_LONG: self._take_command,
@@ -93,39 +95,61 @@ class Vehicle(Outbox):
         """
         self.now = now
         self.exchange.header[RECEIVED] += 1
-        known = self.peers.by_address.get(address)
-        bucket = known.incoming if known is not None else self.peers.strangers
-        if len(datagram) < 8 or datagram[0] not in {0xFD, 0xFE} or not bucket.take(now):
+        if len(datagram) < 8 or datagram[0] not in {0xFD, 0xFE} or not self.peers.looked_at(address, now):
             self.exchange.header[DISCARDED] += 1
             return
-        used = False
+        peer: Peer | None = None
         for frame in frames(datagram):
-            if frame.system_id in {0, self.config.system_id}:
+            if not self._may_act(frame, address):
                 continue
-            if self._signatures is not None and not self._signatures.accepts(frame):
-                continue
-            new = address not in self.peers.by_address
-            if new and self._signatures is not None and not frame.signed:
-                continue  # a radio may speak without a key, but that earns no telemetry
-            peer = self.peers.learn(address, now)
             if peer is None:
-                break
-            used = True
+                peer = self.peers.learn(address, now, size=len(datagram))
             peer.ids.add((frame.system_id, frame.component_id))
-            if new or not peer.greeted:
-                peer.greeted = True
-                self._greet(peer)
+            peer.proved = peer.proved or (self._signatures is not None and frame.signed)
             if frame.message_id in self._handled:
                 message = decode(frame, self._decoder)
                 if message is not None:
                     self._dispatch(message, frame, peer, received_ns=received_ns, now=now)
-        if not used:
+        if peer is None:
             self.exchange.header[DISCARDED] += 1
+        else:
+            self._meet(peer)
+
+    def _may_act(self, frame: Frame, address: Address) -> bool:
+        """Whether a frame comes from somebody else and is signed where that is asked for."""
+        where = f"{address[0]}:{address[1]}"
+        if frame.system_id in {0, self.config.system_id}:
+            self.tell_once((address, frame.system_id), f"Ignored {where}: system {frame.system_id} is no station's id")
+            return False
+        if self._signatures is None:
+            return True
+        if not self._signatures.accepts(frame):
+            why = "signature is wrong or old" if frame.signed else "not signed"
+            self.tell_once((address, frame.signed), f"Ignored {where}: {why}")
+            return False
+        # A radio may speak without a key, but that earns no telemetry.
+        return frame.signed or address in self.peers.by_address
+
+    def _meet(self, peer: Peer) -> None:
+        """Make a station of a sender that has shown itself to be one; ask the others to."""
+        if self.peers.accept(peer, self.now):
+            peer.greeted = False
+        if peer.accepted:
+            if not peer.greeted:
+                peer.greeted = True
+                self._greet(peer)
+        elif peer.proved:
+            self.tell_once("full", f"No room for {peer.address[0]}:{peer.address[1]}: {MOST_PEERS} stations are here")
+        elif self.now - peer.challenged >= _CHALLENGE_S:
+            peer.challenged = self.now
+            self.send(peer, self.factory.build(ids.HEARTBEAT)[0])
+            self.send(peer, dialect.MAVLink_ping_message(*self.peers.seal(peer, self.now), 0, 0))
 
     def _dispatch(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
         """Hand a message to whoever answers it."""
         number = frame.message_id
         if number in {MANUAL_CONTROL, OVERRIDE}:
+            peer.addressed = True
             self._stick_port.take(message, frame, peer, received_ns=received_ns)
             return
         if number == _GROUND_HEARTBEAT:
@@ -133,6 +157,7 @@ class Vehicle(Outbox):
                 peer.last_heartbeat = now
             return
         if self._is_for_us(message):
+            peer.addressed = peer.addressed or getattr(message, "target_system", 0) == self.config.system_id
             self._answers[number](message, frame, peer)
 
     def _is_for_us(self, message: Any) -> bool:
@@ -154,6 +179,13 @@ class Vehicle(Outbox):
             self.reply(peer, extra)
         if answer.result == ACCEPTED:
             self._tell_changes()
+
+    def _take_ping(self, message: Any, frame: Frame, peer: Peer) -> None:
+        """A question, or the answer to ours, which shows that somebody hears us there."""
+        if message.target_system == 0:
+            self.services.ping(message, frame, peer)
+        elif (message.time_usec, message.seq) in {self.peers.seal(peer, self.now, age=age) for age in (0, 1)}:
+            peer.proved = True
 
     def _take_set_mode(self, message: Any, frame: Frame, peer: Peer) -> None:
         """The old way to change modes; acknowledged like the command that replaced it."""

@@ -249,6 +249,23 @@ def test_reset_and_freeze_go_to_the_executive_also_while_it_stands(flight):
     assert fly(flight, 1)[0, COLUMN.pilot_mode] == 2.0
 
 
+def test_what_ground_stations_do_to_the_flight_is_an_event(flight):
+    """A freeze and its end, nacelles and conversions by command, and what the MAVLink process has to tell."""
+    live(flight)
+    fly(flight, 1)
+    flight.link.on_note("Ignored 127.0.0.1:1: system 1 is no station's id")
+    flight.link.input.asked = [Request("nacelle", "", math.radians(80.0)), Request("transition", "", 3.0)]
+    fly(flight, 1)
+    flight.link.input.asked = [Request("freeze")]
+    fly(flight, 1)
+    flight.control.paused = True
+    flight.link.input.asked = [Request("freeze")]
+    flight.control.poll()
+    fly(flight, 1)
+    kinds = [event.kind for event in flight.events]
+    assert kinds == ["pilot", "mavlink", "nacelle", "transition", "freeze", "thaw"]
+
+
 def test_what_is_asked_for_after_a_reset_acts_after_it(flight):
     flight.link.input.asked = [
         Request("reset"),
