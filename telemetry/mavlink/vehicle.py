@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
@@ -24,7 +25,7 @@ from telemetry.mavlink.exchange import (
     RECEIVED,
     Exchange,
 )
-from telemetry.mavlink.framing import Frame, SignatureCheck, decode, frames
+from telemetry.mavlink.framing import Frame, decode, frames
 from telemetry.mavlink.notices import INFO, NOTICE, WARNING
 from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import (
@@ -37,6 +38,7 @@ from telemetry.mavlink.parameters import (
 )
 from telemetry.mavlink.peers import MOST_PEERS, Address, Peer
 from telemetry.mavlink.services import Services
+from telemetry.mavlink.signatures import SignatureCheck
 from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST
 from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
 
@@ -64,7 +66,11 @@ class Vehicle(Outbox):
             InputError: A setting, the signing key or the stored parameters are wrong.
         """
         super().__init__(config, exchange, send=send, now=now)
-        self._signatures = SignatureCheck(self.signing_key) if self.signing_key else None
+        self._signatures: SignatureCheck | None = None
+        if self.signing_key is not None:
+            self._signatures = SignatureCheck(self.signing_key, Path(f"{config.signing_key_file}.seen"))
+            if self._signatures.trouble:
+                self.tell_once("seen", f"Signatures from before this start are refused: {self._signatures.trouble}")
         self.services = Services(self)
         self._commands = CommandHandler(self, self.services)
         self._stick_port = StickPort(self)
@@ -124,7 +130,7 @@ class Vehicle(Outbox):
         if self._signatures is None:
             return True
         if not self._signatures.accepts(frame):
-            why = "signature is wrong or old" if frame.signed else "not signed"
+            why = "its signature is wrong, old or dated ahead" if frame.signed else "not signed"
             self.tell_once((address, frame.signed), f"Ignored {where}: {why}")
             return False
         # A radio may speak without a key, but that earns no telemetry.
@@ -260,6 +266,8 @@ class Vehicle(Outbox):
         heartbeat = self.factory.build(ids.HEARTBEAT)[0]
         heartbeat.system_status = dialect.MAV_STATE_POWEROFF
         self.broadcast(heartbeat)
+        if self._signatures is not None:
+            self._signatures.close()
 
     def _stream(self, now: float) -> None:
         """Send every stream that is due; each message is made once for all stations."""
