@@ -25,10 +25,10 @@ _TEXT_SLOTS = 64
 _NOTE = struct.Struct("<120s")
 _NOTE_SLOTS = 32
 
-MAGIC, STOP, READY, PORT, HEARTBEAT, PEERS, RECEIVED, DISCARDED, ACCEPTED, SENT, ARMED, FAULTS = range(12)
+MAGIC, STOP, READY, PORT, HEARTBEAT, PEERS, RECEIVED, DISCARDED, ACCEPTED, SENT, ARMED, FAULTS, ALIVE = range(13)
 """Words of the header: layout check, asked to stop, taking part, own UDP port, life sign, ground stations heard,
 datagrams received, datagrams discarded (budget, whitelist, not MAVLink), stick inputs accepted, messages sent, armed,
-faults caught."""
+faults caught, life sign of the flight (0 while nothing flies)."""
 
 
 class Request(NamedTuple):

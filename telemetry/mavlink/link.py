@@ -22,6 +22,7 @@ from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
 from telemetry.mavlink.exchange import (
     ACCEPTED,
+    ALIVE,
     DISCARDED,
     FAULTS,
     HEARTBEAT,
@@ -178,6 +179,7 @@ class MavlinkLink:
             feedback: What acts.
         """
         self._exchange.write_feedback(feedback)
+        self._exchange.header[ALIVE] += 1
 
     def say(self, text: str, *, severity: int = 6) -> None:
         """Show a text at every ground station.
@@ -191,6 +193,8 @@ class MavlinkLink:
     def watch(self) -> None:
         """Look after the process, at most twice a second; one that died or hangs is started again."""
         now = time.monotonic()
+        if not self._closed:
+            self._exchange.header[ALIVE] += 1
         if self._closed or self.failure is not None or now - self._watched < _WATCH_PERIOD_S:
             return
         self._watched = now
@@ -215,6 +219,11 @@ class MavlinkLink:
         self._exchange.header[READY] = 0
         self._ring.skip_unread()
         self._process = self._start()
+
+    def rest(self) -> None:
+        """Say that nothing flies any more, so that nobody misses frames."""
+        if not self._closed:
+            self._exchange.header[ALIVE] = 0
 
     def counters(self) -> dict[str, int]:
         """What passed so far: ground stations, datagrams received and discarded, inputs used, messages sent."""

@@ -19,6 +19,7 @@ from telemetry.mavlink import messages as ids
 from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler, command_values
 from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import (
+    ALIVE,
     ARMED,
     DISCARDED,
     PEERS,
@@ -26,7 +27,7 @@ from telemetry.mavlink.exchange import (
     Exchange,
 )
 from telemetry.mavlink.framing import Frame, decode, frames
-from telemetry.mavlink.notices import INFO, NOTICE, WARNING
+from telemetry.mavlink.notices import CRITICAL, INFO, NOTICE, WARNING
 from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import (
     FLAP_COMMAND,
@@ -237,6 +238,11 @@ class Vehicle(Outbox):
         feedback = self.exchange.read_feedback()
         if feedback is not None:
             self.state.feedback = feedback
+        if self.state.watch_flight(int(self.exchange.header[ALIVE]), now):
+            if self.state.stalled:
+                self.board.say(CRITICAL, "The flight does not answer: values are old")
+            else:
+                self.board.say(NOTICE, "The flight answers again")
         if self.state.started:
             self.state.update_vtol_state()
         self._follow_input()
@@ -276,8 +282,8 @@ class Vehicle(Outbox):
             if peer.parameter_next >= 0:
                 self.services.continue_list(peer)
             for number in peer.schedule.take_due(now):
-                if number != ids.HEARTBEAT and not self.state.started:
-                    continue
+                if number != ids.HEARTBEAT and (self.state.stalled or not self.state.started):
+                    continue  # what is not known any more is not repeated as if it were
                 if number not in made:
                     made[number] = self.factory.build(number)
                 for message in made[number]:

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.mavlink.config import MavlinkConfig
-from telemetry.mavlink.exchange import Exchange, Feedback, Request
+from telemetry.mavlink.exchange import ALIVE, Exchange, Feedback, Request
 from telemetry.mavlink.peers import MOST_PEERS
 from telemetry.mavlink.vehicle import Vehicle
 
@@ -1082,6 +1082,47 @@ def test_nothing_that_does_not_fit_a_field_ends_the_vehicle(bench):
     bench.fly(2.1)
     attitude = bench.taken("ATTITUDE")[-1]
     assert math.isfinite(attitude.pitch)
+
+
+def test_a_flight_that_does_not_answer_is_told_and_not_shown_as_if_it_flew(bench):
+    """Its process is stopped: no frames, and not the life sign of one that stands still on purpose."""
+    header = bench.exchange.header
+
+    def wait(seconds, *, lives):
+        for _ in range(round(seconds / 0.02)):
+            header[ALIVE] += lives
+            bench.now += 0.02
+            bench.vehicle.tick(bench.now)
+
+    wait(2.0, lives=1)  # paused
+    assert len(bench.taken("ATTITUDE")) > 90
+    wait(1.1, lives=0)
+    beat = bench.taken("HEARTBEAT")[-1]
+    assert beat.system_status == dialect.MAV_STATE_EMERGENCY
+    wait(2.5, lives=0)
+    messages = bench.taken()
+    assert {message.get_type() for message in messages} <= {"HEARTBEAT", "STATUSTEXT"}
+    assert all(m.system_status == dialect.MAV_STATE_EMERGENCY for m in messages if m.get_type() == "HEARTBEAT")
+    wait(0.5, lives=1)
+    messages = bench.taken()
+    assert any("answers again" in m.text for m in messages if m.get_type() == "STATUSTEXT")
+    assert next(m for m in messages if m.get_type() == "HEARTBEAT").system_status == dialect.MAV_STATE_STANDBY
+    assert "ATTITUDE" in {message.get_type() for message in messages}
+    header[ALIVE] = 0  # over
+    wait(5.0, lives=0)
+    assert not bench.vehicle.state.stalled
+
+
+def test_a_flight_in_slow_motion_is_not_taken_for_dead(bench):
+    """Its frames are seconds apart."""
+    told = []
+    for frame in range(10):
+        bench.exchange.header[ALIVE] += 1
+        for _ in range(200):
+            bench.now += 0.02
+            bench.vehicle.tick(bench.now)
+            told += [frame] * bench.vehicle.state.stalled
+    assert set(told) <= {0}
 
 
 def test_farewell(bench):
