@@ -58,6 +58,7 @@ class _Control:
 
     __slots__ = (
         "_along",
+        "_blends",
         "_elapsed",
         "_fastest",
         "_furthest",
@@ -74,7 +75,7 @@ class _Control:
         self._fastest = fastest
         self._offset, self._elapsed, self._time = 0.0, 0.0, 1.0
         self._source: tuple[int, int] | None = None
-        self._taken = False
+        self._taken = self._blends = False
         self._along, self._furthest = 0.0, 0.0
 
     @property
@@ -88,6 +89,10 @@ class _Control:
         away = abs(self._furthest - self._rest - self._along)
         return self.held and not self._taken and away > _ELSEWHERE
 
+    def blend(self) -> None:
+        """Fade from here to where its hand has it in the coming frame."""
+        self._blends = True
+
     def step(self, hand: _Hand | None, dt: float, *, settings: StickSettings, rest: float | None, trim: float) -> float:
         """The control for this frame.
 
@@ -97,7 +102,8 @@ class _Control:
             rest: Where it goes without a hand; None stays.
             trim: Added to it.
         """
-        restart = None
+        restart = settings.blend_time if self._blends else None
+        self._blends = False
         source = None if hand is None else hand.source
         if source != self._source:
             if self._taken or self._along:
@@ -222,6 +228,11 @@ class StickHandler:
         self._stream = 0
         self._stop_nacelles()  # what was asked of them before another pilot flew is over
         self.state = INPUT_NONE if self.state == INPUT_NONE else INPUT_LIVE
+
+    def go_on(self) -> None:
+        """The flight goes on after it stood still: what the hands moved meanwhile fades in."""
+        self._stick.blend()
+        self._lever.blend()
 
     def go_to(self, angle: float) -> None:
         """Send the nacelles to an angle at the switch's rate.

@@ -142,6 +142,7 @@ class Hands:
                 self._control.reset()
             else:
                 self._deferred.append(request)
+        self._handler.go_on()
         self._link.watch()
 
     def engage(self) -> None:

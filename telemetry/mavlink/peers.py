@@ -12,7 +12,7 @@ import hashlib
 import hmac
 import ipaddress
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
@@ -113,8 +113,6 @@ class Peer:
     """It was told who we are."""
     parameter_next: int = -1
     """Index of the next parameter of a list under way; -1 none."""
-    ids: set[tuple[int, int]] = field(default_factory=set)
-    """System and component ids heard from there."""
 
 
 class PeerTable:

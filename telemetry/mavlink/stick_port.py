@@ -30,6 +30,7 @@ class StickPort:
         self._outbox = outbox
         self._explained = False
         self._pilot: PilotId | None = None
+        self._bipolar = False
 
     def take(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int) -> None:
         """Take sticks from whoever holds them.
@@ -59,14 +60,15 @@ class StickPort:
             else:
                 outbox.tell_once(frame.system_id, f"System {frame.system_id} may not fly")
             return
+        bipolar = outbox.store[LEVER_RANGE] == 1.0
         silent = received_ns - outbox.reader.sticks.received_ns > lasts_ns
-        if silent or pilot != self._pilot:  # what was held before must not come back with the first packet
+        if silent or (pilot, bipolar) != (self._pilot, self._bipolar):
+            # What was held before must not come back with the first packet, nor mean something else in another range.
             outbox.reader.forget(buttons=pilot != self._pilot)
-            self._pilot = pilot
+            self._pilot, self._bipolar = pilot, bipolar
         if before != outbox.lock.owner:
             board.say(INFO, f"Sticks: {pilot}")
         if manual:
-            bipolar = outbox.store[LEVER_RANGE] == 1.0
             pressed = outbox.reader.manual_control(
                 message, received_ns=received_ns, pilot=pilot, bipolar=bipolar, lasts_ns=lasts_ns
             )

@@ -111,7 +111,6 @@ class Vehicle(Outbox):
                 continue
             if peer is None:
                 peer = self.peers.learn(address, now, size=len(datagram))
-            peer.ids.add((frame.system_id, frame.component_id))
             peer.proved = peer.proved or (self._signatures is not None and frame.signed)
             if frame.message_id in self._handled:
                 message = decode(frame, self._decoder)

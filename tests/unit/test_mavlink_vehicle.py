@@ -751,6 +751,15 @@ def test_another_pilot_and_input_that_is_back_are_other_streams(bench):
     assert len(set(streams)) == 3
 
 
+def test_another_range_of_the_lever_is_another_hand(bench):
+    bench.send(manual(z=700))
+    before = bench.exchange.read_sticks().stream
+    bench.fly(0.1)
+    set_parameter(bench, "XV_Z_BIPOLAR", 1.0)
+    bench.send(manual(z=700))
+    assert bench.exchange.read_sticks().stream != before
+
+
 def test_controls_that_wait_for_their_hand_are_told(bench):
     bench.feedback = bench.feedback._replace(waiting=3.0, lever=0.73)
     bench.fly(1.0)

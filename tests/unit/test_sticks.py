@@ -116,6 +116,16 @@ def test_another_hand_waits_until_it_moves(change):
     assert (last.stick, last.lever) == (0.1, 0.4)
 
 
+def test_what_was_moved_while_the_flight_stood_still_fades_in():
+    hands = handler()
+    fly(hands, LIVE, frames=5)
+    hands.go_on()
+    commands, _ = fly(hands, LIVE._replace(stick=0.5, lever=0.2), frames=60)
+    levers = np.array([0.6, *(command.lever for command in commands)])
+    assert np.max(np.abs(np.diff(levers))) <= 0.0101
+    assert (commands[-1].stick, levers[-1]) == (0.5, 0.2)
+
+
 def test_a_stick_that_appears_among_inputs_that_go_on_acts():
     """Somebody gave an override channel a value; a stick nobody had was centred."""
     hands = handler()
