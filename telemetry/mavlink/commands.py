@@ -141,7 +141,7 @@ class CommandHandler:
                 return Answer(TEMPORARILY_REJECTED)
         if outbox.state.armed != bool(wanted):
             outbox.state.armed = bool(wanted)
-            outbox.board.say(INFO, "Armed" if wanted else "Disarmed")
+            outbox.tell(INFO, "Armed" if wanted else "Disarmed")
         return Answer(ACCEPTED)
 
     def _set_mode(self, context: CommandContext) -> Answer:

@@ -54,8 +54,18 @@ class Outbox:
         self._send = send
         self._told: set[object] = set()
 
+    def tell(self, severity: int, text: str) -> None:
+        """Say something at every station that is worth an event of the flight too.
+
+        Args:
+            severity: MAV_SEVERITY.
+            text: One line; stations show 50 characters of it.
+        """
+        self.board.say(severity, text)
+        self.exchange.put_note(text)
+
     def tell_once(self, key: object, text: str) -> None:
-        """Tell the flight, once, what would otherwise go unnoticed; it says it in its terminal and at every station.
+        """Tell, once, what would otherwise go unnoticed.
 
         Args:
             key: What it is about.
@@ -63,7 +73,7 @@ class Outbox:
         """
         if key not in self._told and len(self._told) < _MOST_TOLD:
             self._told.add(key)
-            self.exchange.put_note(text)
+            self.tell(WARNING, text)
 
     def request(self, request: Request) -> None:
         """Ask the flight for something.

@@ -67,7 +67,7 @@ class StickPort:
             outbox.reader.forget(buttons=pilot != self._pilot)
             self._pilot, self._bipolar = pilot, bipolar
         if before != outbox.lock.owner:
-            board.say(INFO, f"Sticks: {pilot}")
+            outbox.tell(INFO, f"Sticks: {pilot}")
         if manual:
             pressed = outbox.reader.manual_control(
                 message, received_ns=received_ns, pilot=pilot, bipolar=bipolar, lasts_ns=lasts_ns

@@ -154,8 +154,9 @@ class Vehicle(Outbox):
     def _dispatch(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
         """Hand a message to whoever answers it."""
         number = frame.message_id
+        target = getattr(message, "target_system", getattr(message, "target", 0))
+        peer.addressed = peer.addressed or target == self.config.system_id
         if number in {MANUAL_CONTROL, OVERRIDE}:
-            peer.addressed = True
             self._stick_port.take(message, frame, peer, received_ns=received_ns)
             return
         if number == _GROUND_HEARTBEAT:
@@ -163,7 +164,6 @@ class Vehicle(Outbox):
                 peer.last_heartbeat = now
             return
         if self._is_for_us(message):
-            peer.addressed = peer.addressed or getattr(message, "target_system", 0) == self.config.system_id
             self._answers[number](message, frame, peer)
 
     def _is_for_us(self, message: Any) -> bool:
@@ -316,7 +316,7 @@ class Vehicle(Outbox):
     def _look_after_peers(self, now: float) -> None:
         owner = self.lock.owner
         if self.lock.release_if_silent(now, release_after=self.store[OWNER_TIME]):
-            self.board.say(INFO, f"Sticks free, {owner} is silent")
+            self.tell(INFO, f"Sticks free, {owner} is silent")
         self.peers.forget_silent(now)
         for peer in self.peers.by_address.values():
             self.board.watch_peer(peer, now)

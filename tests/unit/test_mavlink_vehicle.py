@@ -1044,7 +1044,15 @@ def test_a_sender_that_is_ignored_is_told_once(bench, system, component):
         bench.fly(0.6)
     told = [f"Ignored 127.0.0.1:14999: system {system} is no station's id"]
     assert bench.exchange.take_notes() == told
+    assert [text for text in bench.texts() if "Ignored" in text] == [told[0][:50]]
     assert bench.exchange.read_sticks().sequence == 0
+
+
+def test_who_arms_and_who_flies_are_events_of_the_flight(bench):
+    bench.command(400, 1.0)
+    bench.send(manual())
+    bench.fly(2.2)
+    assert bench.exchange.take_notes() == ["Armed", "Sticks: 255/190", "Sticks free, 255/190 is silent"]
 
 
 def test_a_system_that_may_not_fly_is_told_once(bench):
