@@ -49,6 +49,10 @@ class StickInput(NamedTuple):
     """Buttons held, one bit each."""
     owner: int = 0
     """Who holds the sticks: 256 * MAVLink system id + component id; 0 nobody."""
+    stream: int = 0
+    """When these inputs began, or began anew [ns]; another value means another hand, or one that was away."""
+    overridden: int = 0
+    """What a second source of the same hand has taken from the first: 1 the stick, 2 the lever."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _LISTEN = "127.0.0.1:14550"
 _SCREEN_HZ = 10.0
+_LEVER_REST_S = 1.0
 HOLD_MODE = 0x03040000
 """PX4's number of the mode in which the virtual pilot flies."""
 
@@ -140,10 +141,16 @@ def _fly(device: Device, stick_map: GamepadMap, sender: Sender, *, rate_hz: floa
 
 
 def _follow_lever(mapper: Mapper, sender: Sender) -> None:
-    """Keep the power lever where the vehicle has it until we fly, so that nothing jumps when we take over."""
-    lever = sender.vehicle.applied_lever
-    if lever is not None and (sender.sent == 0 or sender.vehicle.custom_mode == HOLD_MODE):
-        mapper.lever = lever
+    """Keep a power lever that has no place of its own where the vehicle has it, whenever nobody moves it.
+
+    Any vehicle's until we fly; later only that of ours, whose RC_CHANNELS say what acts and not what a radio sends.
+    """
+    vehicle = sender.vehicle
+    if vehicle.applied_lever is None or not vehicle.present:
+        return
+    rests = "nac_deg" in vehicle.values and mapper.lever_rest_s > _LEVER_REST_S
+    if sender.sent == 0 or rests or vehicle.custom_mode == HOLD_MODE:
+        mapper.lever = vehicle.applied_lever
 
 
 def _check_device(device: Device) -> None:

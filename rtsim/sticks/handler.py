@@ -1,14 +1,16 @@
 """Turns stick inputs into commands, frame by frame: pure, deterministic, and without a jump when input comes and goes.
 
-The age of the input is an argument: the handler knows no clock. A value that is followed is applied unchanged in the
-frame that reads it; only when the source of a control changes (input lost, input back, another pilot before) does what
-was applied fade into what is now wanted.
+The age of the input is an argument: the handler knows no clock. Every control is taken over softly, whatever brought
+another hand to it (a first input, input that is back, another owner, message or pilot before): it stays where it is
+until its hand moves through it, and goes along by as much as the hand moves away from it. So nothing moves that nobody
+moved. Once taken, a control is where the hand is, unchanged, in the frame that reads it.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rtsim.command import Command, StickInput
 from rtsim.nacelle.nacelle_kernels import NacelleTables, switch_rate_limit
@@ -22,6 +24,8 @@ LARGEST_TRIM = 0.5
 """Largest offset of the stick trim [half travels]."""
 STICK_FADE_RATE, LEVER_FADE_RATE = 5.0, 2.5
 """A fade moves no control faster than 1 % of its travel in 4 ms [1/s]."""
+_ELSEWHERE = 0.02
+"""A hand that is further from its control than this is worth a word."""
 _SAME_ANGLE = 1e-9
 _NEW_ANGLE = math.radians(0.05)
 
@@ -38,18 +42,94 @@ class StickSituation:
     """Stick that trims the aircraft with the hands off: 0 while the bias schedule is on."""
 
 
-class _Fade:
-    """Keeps one control continuous when its source changes."""
+class _Hand(NamedTuple):
+    """A hand on a control."""
 
-    __slots__ = ("_elapsed", "_fastest", "_offset", "_time", "value")
+    place: float
+    """Where it has the control."""
+    source: tuple[int, int]
+    """Whose hand it is, and by which message; another one takes over anew."""
+    came_from: float
+    """Where it was before it was first heard."""
+
+
+class _Control:
+    """One control: taken over softly by a hand, and continuous when its source changes."""
+
+    __slots__ = (
+        "_along",
+        "_blends",
+        "_elapsed",
+        "_fastest",
+        "_furthest",
+        "_offset",
+        "_rest",
+        "_source",
+        "_taken",
+        "_time",
+        "value",
+    )
 
     def __init__(self, value: float, fastest: float) -> None:
-        self.value = value
+        self.value = self._rest = value
         self._fastest = fastest
         self._offset, self._elapsed, self._time = 0.0, 0.0, 1.0
+        self._source: tuple[int, int] | None = None
+        self._taken = self._blends = False
+        self._along, self._furthest = 0.0, 0.0
 
-    def follow(self, target: float, dt: float, restart_in: float | None) -> float:
-        """The control for this frame; ``restart_in`` is the time [s] of a fade that begins now."""
+    @property
+    def held(self) -> bool:
+        """Whether a hand is on it."""
+        return self._source is not None
+
+    @property
+    def waits(self) -> bool:
+        """Whether a hand is on it that is elsewhere and has not taken it yet."""
+        away = abs(self._furthest - self._rest - self._along)
+        return self.held and not self._taken and away > _ELSEWHERE
+
+    def blend(self) -> None:
+        """Fade from here to where its hand has it in the coming frame."""
+        self._blends = True
+
+    def step(self, hand: _Hand | None, dt: float, *, settings: StickSettings, rest: float | None, trim: float) -> float:
+        """The control for this frame.
+
+        Args:
+            hand: The hand on it; None where there is none.
+            settings: Times of the fades.
+            rest: Where it goes without a hand; None stays.
+            trim: Added to it.
+        """
+        restart = settings.blend_time if self._blends else None
+        self._blends = False
+        source = None if hand is None else hand.source
+        if source != self._source:
+            if self._taken or self._along:
+                restart = settings.ramp_time
+            self._source, self._taken, self._along = source, False, 0.0
+            self._rest = self.value
+            self._furthest = 0.0 if hand is None else hand.came_from
+        if rest is not None:
+            self._rest = rest
+        if hand is not None and not self._taken and self._meets(hand.place):
+            self._taken, restart = True, settings.blend_time
+        target = hand.place if hand is not None and self._taken else self._rest + self._along
+        return self._fade(min(max(target + trim, -1.0), 1.0), dt, restart)
+
+    def _meets(self, place: float) -> bool:
+        """Whether the hand met the control or moved through it; moving away takes it along."""
+        here, before = place - self._rest - self._along, self._furthest - self._rest - self._along
+        if here * before <= 0.0:
+            return True
+        if abs(here) > abs(before):
+            self._along += place - self._furthest
+            self._furthest = place
+        return False
+
+    def _fade(self, target: float, dt: float, restart_in: float | None) -> float:
+        """Go to a target; ``restart_in`` is the time [s] of a fade that begins now."""
         if restart_in is not None:
             self._offset = self.value - target
             self._time = max(restart_in, abs(self._offset) / self._fastest)
@@ -96,9 +176,9 @@ class StickHandler:
         """Conversion by command under way: 0 none, TO_HELICOPTER, TO_AIRPLANE."""
         self.trim = 0.0
         """Offset set by the trim buttons [half travels]."""
-        self._stick = _Fade(start.stick, STICK_FADE_RATE)
-        self._lever = _Fade(start.lever, LEVER_FADE_RATE)
-        self._stick_held = self._lever_held = False
+        self._stick = _Control(start.stick, STICK_FADE_RATE)
+        self._lever = _Control(start.lever, LEVER_FADE_RATE)
+        self._stream = 0
         self._target = math.nan
         self._axis_angle = math.nan
         self.change(settings)
@@ -116,6 +196,11 @@ class StickHandler:
         """Power lever of the last frame."""
         return self._lever.value
 
+    @property
+    def waiting(self) -> int:
+        """Controls whose hand is elsewhere and has not taken them yet: 1 the stick, 2 the lever."""
+        return int(self._stick.waits) | int(self._lever.waits) << 1
+
     def change(self, settings: StickSettings) -> None:
         """Take other settings from the next frame on.
 
@@ -132,17 +217,22 @@ class StickHandler:
     def engage(self, acting: Command) -> None:
         """Take the controls over from another pilot.
 
-        Sticks that are live are followed at once: what then differs from the acting controls is faded by the pilot
-        aids. Where no stick is live, the lever stays as it is.
+        The lever stays as it is and the stick is at its trim until the hands take them; what then differs from the
+        acting controls is faded by the pilot aids.
 
         Args:
             acting: Controls that acted last.
         """
-        self._lever = _Fade(acting.lever, LEVER_FADE_RATE)
-        self._stick = _Fade(0.0, STICK_FADE_RATE)
-        self._stick_held = self._lever_held = True
+        self._lever = _Control(acting.lever, LEVER_FADE_RATE)
+        self._stick = _Control(0.0, STICK_FADE_RATE)
+        self._stream = 0
         self._stop_nacelles()  # what was asked of them before another pilot flew is over
         self.state = INPUT_NONE if self.state == INPUT_NONE else INPUT_LIVE
+
+    def go_on(self) -> None:
+        """The flight goes on after it stood still: what the hands moved meanwhile fades in."""
+        self._stick.blend()
+        self._lever.blend()
 
     def go_to(self, angle: float) -> None:
         """Send the nacelles to an angle at the switch's rate.
@@ -180,23 +270,22 @@ class StickHandler:
         fresh = sticks.sequence > 0 and age <= settings.loss_time
         stick_held, lever_held = fresh and sticks.stick_valid, fresh and sticks.lever_valid
         self._follow_state(held=stick_held or lever_held)
+        stream = max(sticks.stream, 1) if fresh else 0
+        goes_on, self._stream = stream == self._stream, stream
         if stick_held and sticks.trim:
             moved = self.trim + sticks.trim * settings.trim_rate * dt
             self.trim = min(max(moved, -LARGEST_TRIM), LARGEST_TRIM)
 
-        wanted = shaped(settings, sticks.stick) if stick_held else situation.trim_stick
-        wanted = min(max(wanted + self.trim, -1.0), 1.0)
-        restart = None
-        if stick_held != self._stick_held:
-            restart = settings.blend_time if stick_held else settings.ramp_time
-        stick = self._stick.follow(wanted, dt, restart)
+        place = shaped(settings, sticks.stick)
+        # A stick that nobody had, and that appears among inputs that go on, comes from its centre.
+        before = 0.0 if goes_on and not self._stick.held else place
+        hand = _Hand(place, (stream, sticks.overridden & 1), before) if stick_held else None
+        stick = self._stick.step(hand, dt, settings=settings, rest=situation.trim_stick, trim=self.trim)
+        place = min(max(sticks.lever, 0.0), 1.0)
+        hand = _Hand(place, (stream, sticks.overridden & 2), place) if lever_held else None
+        lever = self._lever.step(hand, dt, settings=settings, rest=None, trim=0.0)
 
-        wanted = min(max(sticks.lever, 0.0), 1.0) if lever_held else self._lever.value
-        restart = settings.blend_time if lever_held != self._lever_held else None
-        lever = self._lever.follow(wanted, dt, restart)
-        self._stick_held, self._lever_held = stick_held, lever_held
-
-        rate = self._nacelle_rate(sticks, fresh=fresh, situation=situation, dt=dt)
+        rate = self._nacelle_rate(sticks, fresh=fresh, goes_on=goes_on, situation=situation, dt=dt)
         return Command(stick, lever, rate)
 
     def _follow_state(self, *, held: bool) -> None:
@@ -211,12 +300,14 @@ class StickHandler:
         self._target, self.transition = math.nan, 0
         self._switch.state[:] = 0.0
 
-    def _nacelle_rate(self, sticks: StickInput, *, fresh: bool, situation: StickSituation, dt: float) -> float:
+    def _nacelle_rate(
+        self, sticks: StickInput, *, fresh: bool, goes_on: bool, situation: StickSituation, dt: float
+    ) -> float:
         """Rate of the command angle: the switch first, then an angle to go to, then a conversion [rad/s]."""
         pressed = sticks.nacelle_switch if fresh else 0
         self.nacelle_switch = pressed
         if fresh:
-            self._follow_axis(sticks.nacelle_angle)
+            self._follow_axis(sticks.nacelle_angle, goes_on=goes_on)
         if pressed:
             self._target, self.transition = math.nan, 0
         angle = situation.nacelle_command
@@ -235,10 +326,10 @@ class StickHandler:
             return self._transition_rate(self._schedule, situation, dt)
         return 0.0
 
-    def _follow_axis(self, angle: float) -> None:
-        """An axis commands when it appears or moves; at rest it leaves the switch alone."""
-        if not math.isfinite(angle):
-            self._axis_angle = math.nan
+    def _follow_axis(self, angle: float, *, goes_on: bool) -> None:
+        """An axis commands when it moves, or appears among inputs that go on; at rest it leaves the switch alone."""
+        if not goes_on or not math.isfinite(angle):
+            self._axis_angle = angle
         elif not abs(angle - self._axis_angle) <= _NEW_ANGLE:
             self._axis_angle = angle
             self.go_to(angle)

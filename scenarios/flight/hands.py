@@ -17,8 +17,8 @@ from rtsim.realtime.control import FlightControl
 from rtsim.realtime.source import SwitchedFlight
 from rtsim.sticks.handler import INPUT_LIVE, INPUT_NONE, StickHandler, StickSituation
 from rtsim.sticks.settings import StickSettings
-from rtsim.sticks.transition import transition_schedule
-from rtsim.units import KNOT, deg
+from rtsim.sticks.transition import TO_HELICOPTER, transition_schedule
+from rtsim.units import KNOT, deg, to_deg
 from telemetry.mavlink.exchange import Feedback, Request
 from telemetry.mavlink.link import MavlinkLink
 
@@ -74,6 +74,8 @@ class Hands:
         self._schedule = transition_schedule(load_boundary(simulation.setup.options.corridor_name, simulation.database))
         self._waits = waits
         self._deferred: list[Request] = []
+        self._notes: list[tuple[str, str]] = []
+        link.on_note = lambda text: self._notes.append(("mavlink", text))
         self._frames = 0
         self._waiting = waits
         self._begin(simulation)
@@ -88,6 +90,8 @@ class Hands:
         Returns:
             The hands' command where they fly, else None.
         """
+        while self._notes:
+            flight.tell(*self._notes.pop(0))
         requests = self._link.input.requests()
         if requests or self._deferred:
             pending, self._deferred = [*self._deferred, *requests], []
@@ -125,6 +129,7 @@ class Hands:
                 self._link.input.first_use_age,
                 self._aid_bits(simulation.aids),
                 float(handler.transition),
+                waiting=float(handler.waiting if simulation.mode == "external" else 0),
             )
         )
         return command
@@ -143,12 +148,13 @@ class Hands:
         """Hear requests while the flight stands still; called by the executive."""
         for request in self._link.input.requests():
             if request.kind == "freeze":
-                self._control.toggle_pause()
+                self._notes.append(self._toggle_pause())
             elif request.kind == "reset":
                 self._deferred.clear()  # asked for before it
                 self._control.reset()
             else:
                 self._deferred.append(request)
+        self._handler.go_on()
         self._link.watch()
 
     def engage(self) -> None:
@@ -188,7 +194,7 @@ class Hands:
     def _serve(self, request: Request, flight: HandedFlight) -> None:
         kind = request.kind
         if kind == "freeze":
-            self._control.toggle_pause()
+            flight.tell(*self._toggle_pause())
         elif kind == "reset":
             self._control.reset()
         elif kind == "pilot":
@@ -206,8 +212,22 @@ class Hands:
                 flight.switch_pilot("external", by_hand=True)
             if kind == "nacelle":
                 self._handler.go_to(request.value)
-            else:
-                self._handler.start_transition(int(request.value))
+                flight.tell(kind, f"a ground station sends the nacelles to {to_deg(request.value):.0f} deg")
+            elif self._handler.start_transition(int(request.value)):
+                towards = "helicopter" if int(request.value) == TO_HELICOPTER else "airplane"
+                flight.tell(kind, f"a ground station asks for the conversion to the {towards}")
+
+    def _toggle_pause(self) -> tuple[str, str]:
+        """Freeze the flight, or let it go on; gives the event of it."""
+        self._control.toggle_pause()
+        return (
+            ("thaw", "a ground station lets the flight go on")
+            if self._control.paused
+            else (
+                "freeze",
+                "a ground station freezes the flight",
+            )
+        )
 
     def _trim_stick(self, simulation: Simulation) -> float:
         """Stick that trims with the hands off: none where the bias schedule supplies it."""

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from telemetry.view.view import RerunView
 
 beside.also("rtsim.measures.metrics:compile_measures")
-TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "advice", "end"})
+TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "advice", "end", "freeze", "thaw"})
 """Events that ground stations are told of as text."""
 VIEW_PATIENCE_S = 1.5
 """How long the first frame waits for a view that is starting [s]; the flight begins without it after that."""
@@ -155,12 +155,14 @@ def fly(
         if outputs.on_start is not None:
             outputs.on_start()
         timing = executive.fly()
+        if link is not None:
+            link.rest()
         record = _measure(scenario, session, sinks, timing, simulation.database_hash)
         if hands is not None:
             record = dataclasses.replace(record, mavlink=hands.summary())
     except BaseException:
-        _close(log, view, None)
         _close_mavlink(link)
+        _close(log, view, None)
         raise
     link_failure = _close_mavlink(link)
     return dataclasses.replace(record, failure=_close(log, view, record) or link_failure)

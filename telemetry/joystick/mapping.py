@@ -86,6 +86,8 @@ class Mapper:
         self.stick_map = stick_map
         self.lever = lever
         """Power lever now, 0 to 1."""
+        self.lever_rest_s = 0.0
+        """How long nobody has moved it [s]."""
         self._held: frozenset[str] = frozenset()
 
     def controls(self, state: DeviceState, dt: float) -> Controls:
@@ -117,6 +119,7 @@ class Mapper:
         return frozenset(held)
 
     def _move_lever(self, axis: LeverAxis | None, state: DeviceState, held: frozenset[str], dt: float) -> None:
+        before = self.lever
         if axis is not None and axis.index < len(state.axes):
             value = axis_value(axis, state)
             if axis.mode == "absolute":
@@ -126,6 +129,7 @@ class Mapper:
         self.lever += state.lever_steps
         self.lever += LEVER_BUTTON_RATE * dt * (("lever_up" in held) - ("lever_down" in held))
         self.lever = min(max(self.lever, 0.0), 1.0)
+        self.lever_rest_s = self.lever_rest_s + dt if self.lever == before else 0.0
 
 
 def axis_value(axis: DeviceAxis | None, state: DeviceState) -> float:

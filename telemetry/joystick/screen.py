@@ -75,6 +75,8 @@ def picture(controls: Controls, vehicle: VehicleView, *, device: str, rate_hz: f
         lines.append(Text("Waiting for a vehicle: start rtsim fly manual_flight --pilot mavlink", style="yellow"))
     else:
         lines.append(_vehicle_line(vehicle))
+        if vehicle.applied_lever is None:
+            lines.append(Text("Sends no sticks until the vehicle says where its power lever is", style="yellow"))
         values = [
             f"{label} {vehicle.values[key]:.{digits}f} {unit}"
             for key, label, unit, digits in _SHOWN

@@ -15,12 +15,12 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.errors import InputError
 from telemetry.joystick.mapping import Controls
 from telemetry.mavlink.config import Endpoint
-from telemetry.mavlink.framing import decode, frames
+from telemetry.mavlink.framing import LARGEST_DATAGRAM, decode, frames
 
 SYSTEM_ID, COMPONENT_ID = 255, 190
 """A ground station, as every vehicle expects it."""
 _SILENCE_S = 3.0
-_LEVER_PATIENCE_S = 1.5
+_RC_CHANNELS, _REQUEST_MESSAGE = 65, 512
 
 
 @dataclass(slots=True)
@@ -33,8 +33,6 @@ class VehicleView:
     """Where it is."""
     heard: float = -1e9
     """When it was heard last, monotonic [s]."""
-    found: float = math.inf
-    """When it was heard first, monotonic [s]."""
     armed: bool = False
     """Whether it is armed."""
     custom_mode: int = 0
@@ -67,12 +65,19 @@ class Sender:
         """
         self.vehicle = VehicleView()
         """The vehicle."""
-        self._connect = connect
+        self._connect = (connect.host, connect.port) if connect else None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.bind((listen.host, listen.port) if listen else ("0.0.0.0" if connect else "127.0.0.1", 0))
+            if self._connect is not None:
+                self._socket.connect(self._connect)  # from now on the system drops what others send
+            elif listen is not None:
+                self._socket.bind((listen.host, listen.port))
         except OSError as failure:
             self._socket.close()
+            if connect is not None:
+                raise InputError(
+                    f"cannot be reached ({failure.strerror})", key="--connect", value=str(connect)
+                ) from failure
             raise InputError(
                 f"the port cannot be opened ({failure.strerror})",
                 key="--listen",
@@ -84,6 +89,7 @@ class Sender:
         self._encoder = dialect.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
         self._decoder = dialect.MAVLink(None)
         self._beat = -1e9
+        self._waited = False
         self.sent = 0
         """MANUAL_CONTROL messages sent."""
 
@@ -94,15 +100,14 @@ class Sender:
 
     @property
     def knows_lever(self) -> bool:
-        """Whether the vehicle has told where its lever is, or has had time enough to."""
-        view = self.vehicle
-        return view.applied_lever is not None or time.monotonic() - view.found > _LEVER_PATIENCE_S
+        """Whether the vehicle has told where its power lever is; until then nothing is sent that could move it."""
+        return self.vehicle.applied_lever is not None
 
     def poll(self) -> None:
         """Take what came, and say once a second that we are here."""
         while True:
             try:
-                data, address = self._socket.recvfrom(2048)
+                data, address = self._socket.recvfrom(LARGEST_DATAGRAM)
             except (BlockingIOError, InterruptedError):
                 break
             except OSError:
@@ -119,6 +124,9 @@ class Sender:
                     dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
                 )
             )
+            if self._waited and not self.knows_lever:
+                self._command(_REQUEST_MESSAGE, _RC_CHANNELS)
+            self._waited = self.vehicle.system_id != 0
 
     def fly(self, controls: Controls) -> None:
         """Send sticks and buttons, and what was pressed.
@@ -140,16 +148,16 @@ class Sender:
     def _act(self, pressed: Iterable[str]) -> None:
         system = self.vehicle.system_id
         if "arm" in pressed:
-            wanted = 0.0 if self.vehicle.armed else 1.0
-            self._send(dialect.MAVLink_command_long_message(system, 1, 400, 0, wanted, 0, 0, 0, 0, 0, 0))
+            self._command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0 if self.vehicle.armed else 1.0)
         if "reset" in pressed:
             real32 = dialect.MAV_PARAM_TYPE_REAL32
             self._send(dialect.MAVLink_param_set_message(system, 1, b"XV_RESET", 1.0, real32))
 
+    def _command(self, number: int, value: float) -> None:
+        self._send(dialect.MAVLink_command_long_message(self.vehicle.system_id, 1, number, 0, value, 0, 0, 0, 0, 0, 0))
+
     def _target(self) -> tuple[str, int] | None:
-        if self.vehicle.address is not None:
-            return self.vehicle.address
-        return (self._connect.host, self._connect.port) if self._connect else None
+        return self._connect or self.vehicle.address
 
     def _send(self, message: Any) -> None:
         target = self._target()
@@ -158,21 +166,32 @@ class Sender:
         packed = message.pack(self._encoder)
         self._encoder.seq = (self._encoder.seq + 1) % 256
         with contextlib.suppress(OSError):  # sticks are sent again in 20 ms
-            self._socket.sendto(packed, target)
+            if self._connect is not None:
+                self._socket.send(packed)
+            else:
+                self._socket.sendto(packed, target)
 
     def _take(self, message: Any, system: int, component: int, address: tuple[str, int]) -> None:
         view, name = self.vehicle, message.get_type()
+        known = (system, address) == (view.system_id, view.address)
+        if not known and (view.present or name != "HEARTBEAT"):
+            return  # one vehicle at a time, where it was found
         if name == "HEARTBEAT":
-            if component != 1 or message.type == dialect.MAV_TYPE_GCS or (view.present and system != view.system_id):
+            if component != 1 or message.type == dialect.MAV_TYPE_GCS:
                 return
-            if view.system_id != system:
-                view.found = time.monotonic()
+            if not known:
+                view.applied_lever = None  # another vehicle's lever is somewhere else
             view.system_id, view.address = system, address
             view.armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
             view.custom_mode = message.custom_mode
-        if system != view.system_id:
-            return
+        elif name == "PING" and message.target_system == 0:
+            self._send(dialect.MAVLink_ping_message(message.time_usec, message.seq, system, component))
         view.heard = time.monotonic()
+        self._keep(message, name)
+
+    def _keep(self, message: Any, name: str) -> None:
+        """Keep what the vehicle says about itself."""
+        view = self.vehicle
         if name == "RC_CHANNELS":
             view.applied_lever = min(max((message.chan3_raw - 1000) / 1000.0, 0.0), 1.0)
         elif name == "NAMED_VALUE_FLOAT":

@@ -85,7 +85,7 @@ class CommandHandler:
             REBOOT: (self._reboot, True),
             STORAGE: (self._storage, True),
             REQUEST_MESSAGE: (self._request_message, False),
-            SET_INTERVAL: (self._set_interval, False),
+            SET_INTERVAL: (self._set_interval, True),
             GET_INTERVAL: (self._get_interval, False),
             CAPABILITIES: (self._capabilities, False),
         }
@@ -141,7 +141,7 @@ class CommandHandler:
                 return Answer(TEMPORARILY_REJECTED)
         if outbox.state.armed != bool(wanted):
             outbox.state.armed = bool(wanted)
-            outbox.board.say(INFO, "Armed" if wanted else "Disarmed")
+            outbox.tell(INFO, "Armed" if wanted else "Disarmed")
         return Answer(ACCEPTED)
 
     def _set_mode(self, context: CommandContext) -> Answer:
@@ -227,6 +227,8 @@ class CommandHandler:
         return Answer(ACCEPTED, tuple(outbox.factory.build(number)))
 
     def _set_interval(self, context: CommandContext) -> Answer:
+        if not context.peer.accepted:
+            return Answer(TEMPORARILY_REJECTED)  # nothing is streamed there yet
         number = _integer(context.values[0], 0, 0xFFFFFF)
         interval = context.values[1]
         if number is None or not (interval == -1.0 or 0.0 <= interval <= LONGEST_INTERVAL_US):

@@ -1,4 +1,4 @@
-"""Shared memory between the flight and its MAVLink process: sticks and requests in, feedback and texts out.
+"""Shared memory between the flight and its MAVLink process: sticks, requests and notes in, feedback and texts out.
 
 Nothing here waits; how, says ``shared_memory``.
 """
@@ -17,16 +17,18 @@ from telemetry.exchange.shared_memory import WORD, Queue, SequenceLock
 
 _MAGIC = 0x5254_5349_4D4D_4156
 _HEADER_WORDS = 32
-_STICK_COUNT = 12
+_STICK_COUNT = 14
 _REQUEST = struct.Struct("<16s24sd")
 _REQUEST_SLOTS = 256
 _TEXT = struct.Struct("<B55s")
 _TEXT_SLOTS = 64
+_NOTE = struct.Struct("<120s")
+_NOTE_SLOTS = 32
 
-MAGIC, STOP, READY, PORT, HEARTBEAT, PEERS, RECEIVED, DISCARDED, ACCEPTED, SENT, ARMED, FAULTS = range(12)
+MAGIC, STOP, READY, PORT, HEARTBEAT, PEERS, RECEIVED, DISCARDED, ACCEPTED, SENT, ARMED, FAULTS, ALIVE = range(13)
 """Words of the header: layout check, asked to stop, taking part, own UDP port, life sign, ground stations heard,
 datagrams received, datagrams discarded (budget, whitelist, not MAVLink), stick inputs accepted, messages sent, armed,
-faults caught."""
+faults caught, life sign of the flight (0 while nothing flies)."""
 
 
 class Request(NamedTuple):
@@ -67,6 +69,8 @@ class Feedback(NamedTuple):
     """Transition under way: 0 none, 3 to helicopter, 4 to airplane."""
     ended: float = 0.0
     """1 once the flight is over."""
+    waiting: float = 0.0
+    """Controls that stay where they are until their hand moves through them: 1 the stick, 2 the lever."""
 
 
 # Offsets in bytes; every part begins on a word.
@@ -75,7 +79,8 @@ _STICK_AT = WORD * _HEADER_WORDS
 _FEEDBACK_AT = _STICK_AT + WORD * (1 + _STICK_COUNT)
 _REQUESTS_AT = _FEEDBACK_AT + WORD * (1 + _FEEDBACK_COUNT)
 _TEXTS_AT = _REQUESTS_AT + WORD * 2 + _REQUEST_SLOTS * _REQUEST.size
-_SIZE = _TEXTS_AT + WORD * 2 + _TEXT_SLOTS * _TEXT.size
+_NOTES_AT = _TEXTS_AT + WORD * 2 + _TEXT_SLOTS * _TEXT.size
+_SIZE = _NOTES_AT + WORD * 2 + _NOTE_SLOTS * _NOTE.size
 
 
 class Exchange:
@@ -113,6 +118,7 @@ class Exchange:
         self._feedback = SequenceLock(self._memory, _FEEDBACK_AT, _FEEDBACK_COUNT)
         self._requests = Queue(self._memory, _REQUESTS_AT, record=_REQUEST, slots=_REQUEST_SLOTS)
         self._texts = Queue(self._memory, _TEXTS_AT, record=_TEXT, slots=_TEXT_SLOTS)
+        self._notes = Queue(self._memory, _NOTES_AT, record=_NOTE, slots=_NOTE_SLOTS)
         self._open = True
         if self._owns:
             atexit.register(self.close)
@@ -148,6 +154,8 @@ class Exchange:
                 float(sticks.trim),
                 float(sticks.buttons),
                 float(sticks.owner),
+                float(sticks.stream),
+                float(sticks.overridden),
             )
         )
 
@@ -156,7 +164,7 @@ class Exchange:
         values = self._stick.read()
         if values is None:
             return None
-        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, trim, buttons, owner = values
+        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, *whole = values
         bits = int(valid)
         return StickInput(
             int(sequence),
@@ -169,9 +177,7 @@ class Exchange:
             bool(bits & 2),
             int(switch),
             angle,
-            int(trim),
-            int(buttons),
-            int(owner),
+            *map(int, whole),
         )
 
     def write_feedback(self, feedback: Feedback) -> None:
@@ -218,12 +224,27 @@ class Exchange:
         """Severity and text of everything said since the last look."""
         return [(int(record[0]), _text(record[1])) for record in self._texts.take()]  # type: ignore[call-overload]
 
+    def put_note(self, text: str) -> bool:
+        """Tell the flight something worth an event.
+
+        Args:
+            text: One line; cut to 120 ASCII characters.
+
+        Returns:
+            Whether there was room.
+        """
+        return self._notes.put(text.encode("ascii", "replace")[:120])
+
+    def take_notes(self) -> list[str]:
+        """Everything the MAVLink process has told since the last look."""
+        return [_text(record[0]) for record in self._notes.take()]
+
     def close(self) -> None:
         """Detach; the side that created it removes it."""
         if not self._open:
             return
         self._open = False
-        for part in (self._stick, self._feedback, self._requests, self._texts):
+        for part in (self._stick, self._feedback, self._requests, self._texts, self._notes):
             part.release()
         self.header.release()
         self._memory.close()

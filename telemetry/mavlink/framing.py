@@ -6,8 +6,6 @@ stands alone. Work per datagram is bounded: no crafted bytes can keep the loop s
 
 from __future__ import annotations
 
-import hashlib
-import hmac
 import struct
 import time
 from collections.abc import Iterator
@@ -23,7 +21,7 @@ RADIO_STATUS = 109
 LARGEST_DATAGRAM = 2048
 """Longer datagrams are cut, as no MAVLink link sends them [bytes]."""
 _MOST_FRAMES, _MOST_FAILURES = 128, 16
-_SIGNATURE_UNITS_PER_S = 100_000
+SIGNATURE_UNITS_PER_S = 100_000
 _SIGNATURE_EPOCH_S = 1_420_070_400  # 2015-01-01 UTC
 _CRC_EXTRA: dict[int, int] = {number: message.crc_extra for number, message in dialect.mavlink_map.items()}
 _checksum = dialect.x25crc
@@ -114,45 +112,4 @@ def decode(frame: Frame, decoder: Any) -> Any | None:
 
 def signature_time() -> int:
     """Now, on the scale of signatures: units of 10 us since 2015."""
-    return int((time.time() - _SIGNATURE_EPOCH_S) * _SIGNATURE_UNITS_PER_S)
-
-
-class SignatureCheck:
-    """Accepts frames signed with one key, each no older than what came before on its stream."""
-
-    def __init__(self, key: bytes) -> None:
-        """Begin with no stream seen.
-
-        Args:
-            key: The shared key, 32 bytes.
-        """
-        self._key = key
-        self._streams: dict[tuple[int, int, int], int] = {}
-        self._newest = 0
-
-    def accepts(self, frame: Frame) -> bool:
-        """Whether a frame may act.
-
-        Args:
-            frame: A frame with a right checksum.
-        """
-        if frame.message_id == RADIO_STATUS:
-            return True
-        if not frame.signed:
-            return False
-        raw = frame.raw
-        wanted = hashlib.sha256(self._key + raw[:-6]).digest()[:6]
-        if not hmac.compare_digest(wanted, raw[-6:]):
-            return False
-        stamp = int.from_bytes(raw[-12:-6], "little")
-        stream = (frame.system_id, frame.component_id, raw[-13])
-        last = self._streams.get(stream)
-        if last is None:
-            oldest = max(self._newest, signature_time()) - 60 * _SIGNATURE_UNITS_PER_S
-            if stamp < oldest or len(self._streams) >= 256:
-                return False
-        elif stamp <= last:
-            return False
-        self._streams[stream] = stamp
-        self._newest = max(self._newest, stamp)
-        return True
+    return int((time.time() - _SIGNATURE_EPOCH_S) * SIGNATURE_UNITS_PER_S)

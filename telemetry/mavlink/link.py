@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
 from telemetry.mavlink.exchange import (
     ACCEPTED,
+    ALIVE,
     DISCARDED,
     FAULTS,
     HEARTBEAT,
@@ -121,6 +123,8 @@ class MavlinkLink:
             read_signing_key(config.signing_key_file)  # a wrong key is told here, not by a process in the background
         self.failure: OutputError | None = None
         """Why there is no MAVLink any more, once that is so; the flight itself goes on."""
+        self.on_note: Callable[[str], object] | None = None
+        """Told what the MAVLink process finds worth an event of the flight."""
         self.restarts = 0
         """How often the process had to be started again."""
         self._ring = Ring(RING_ROWS)
@@ -175,6 +179,7 @@ class MavlinkLink:
             feedback: What acts.
         """
         self._exchange.write_feedback(feedback)
+        self._exchange.header[ALIVE] += 1
 
     def say(self, text: str, *, severity: int = 6) -> None:
         """Show a text at every ground station.
@@ -188,9 +193,14 @@ class MavlinkLink:
     def watch(self) -> None:
         """Look after the process, at most twice a second; one that died or hangs is started again."""
         now = time.monotonic()
+        if not self._closed:
+            self._exchange.header[ALIVE] += 1
         if self._closed or self.failure is not None or now - self._watched < _WATCH_PERIOD_S:
             return
         self._watched = now
+        for note in self._exchange.take_notes():
+            if self.on_note is not None:
+                self.on_note(note)
         life_sign = int(self._exchange.header[HEARTBEAT])
         if life_sign != self._life_sign or not self._exchange.header[READY]:
             self._life_sign, self._life_sign_at = life_sign, now
@@ -209,6 +219,11 @@ class MavlinkLink:
         self._exchange.header[READY] = 0
         self._ring.skip_unread()
         self._process = self._start()
+
+    def rest(self) -> None:
+        """Say that nothing flies any more, so that nobody misses frames."""
+        if not self._closed:
+            self._exchange.header[ALIVE] = 0
 
     def counters(self) -> dict[str, int]:
         """What passed so far: ground stations, datagrams received and discarded, inputs used, messages sent."""

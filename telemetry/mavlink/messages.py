@@ -131,6 +131,8 @@ class MessageFactory:
             base |= dialect.MAV_MODE_FLAG_STABILIZE_ENABLED
         if not state.started:
             status = dialect.MAV_STATE_BOOT
+        elif state.stalled:
+            status = dialect.MAV_STATE_EMERGENCY
         elif not state.armed:
             status = dialect.MAV_STATE_STANDBY
         else:

@@ -15,6 +15,9 @@ from telemetry.mavlink.peers import Address, Peer, PeerTable
 from telemetry.mavlink.pilot_input import OwnerLock, StickReader
 from telemetry.mavlink.state import FlightState
 
+_MOST_TOLD = 16
+"""Nobody may fill the flight's log by being refused again and again."""
+
 
 class Outbox:
     """Settings, state and stations of a vehicle; sends, and asks the flight."""
@@ -49,6 +52,28 @@ class Outbox:
         self.set_after_reset: set[str] | None = None
         """Parameters set since a reset was asked for, which act after it; None where none was."""
         self._send = send
+        self._told: set[object] = set()
+
+    def tell(self, severity: int, text: str) -> None:
+        """Say something at every station that is worth an event of the flight too.
+
+        Args:
+            severity: MAV_SEVERITY.
+            text: One line; stations show 50 characters of it.
+        """
+        self.board.say(severity, text)
+        self.exchange.put_note(text)
+
+    def tell_once(self, key: object, text: str) -> None:
+        """Tell, once, what would otherwise go unnoticed.
+
+        Args:
+            key: What it is about.
+            text: One line.
+        """
+        if key not in self._told and len(self._told) < _MOST_TOLD:
+            self._told.add(key)
+            self.tell(WARNING, text)
 
     def request(self, request: Request) -> None:
         """Ask the flight for something.
@@ -68,8 +93,10 @@ class Outbox:
             peer: The station.
             message: A pymavlink message.
         """
-        self._send(self.peers.pack(peer, message), peer.address)
-        self.exchange.header[SENT] += 1
+        packed = self.peers.pack(peer, message, self.now)
+        if packed is not None:
+            self._send(packed, peer.address)
+            self.exchange.header[SENT] += 1
 
     def reply(self, peer: Peer, message: Any) -> None:
         """Answer one station, unless it has used up its answers for now.

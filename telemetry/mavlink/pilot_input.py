@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,7 +42,10 @@ EDGE_BUTTONS = (
     "governor",
 )
 """Functions that act once when their button goes down; the others act while it is held."""
-_IGNORE = 65535
+_RELEASE, _IGNORE = 0, 65535
+_CHANNEL_BITS = {"stick": 1, "lever": 2}
+_Said = dict[str, tuple[float, int]]
+"""What one message said, and when, by control."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,14 +144,11 @@ class StickReader:
         """The newest input."""
         self.ignored_axes = 0
         """Axis values that were out of range or marked invalid."""
-
-    def function_held(self, function: str) -> bool:
-        """Whether the button of a function is down.
-
-        Args:
-            function: One of ``STANDARD_BUTTONS``.
-        """
-        return bool(self.sticks.buttons >> self._buttons[function] & 1)
+        # The two messages are two sources, and neither touches what the other said: value and time by control.
+        self._manual: _Said = {}
+        self._override: _Said = {}
+        self._held_down = 0
+        self._stream = 0
 
     def forget(self, *, buttons: bool) -> None:
         """Let every axis count as nobody's until it is heard again.
@@ -156,12 +156,15 @@ class StickReader:
         Args:
             buttons: Whether the buttons are forgotten too, so that one held by the next pilot counts as pressed.
         """
-        old = self.sticks
-        self.sticks = StickInput(
-            sequence=old.sequence, received_ns=old.received_ns, buttons=0 if buttons else old.buttons
-        )
+        self._manual.clear()
+        self._override.clear()
+        self._stream = 0
+        if buttons:
+            self._held_down = 0
 
-    def manual_control(self, message: Any, *, received_ns: int, pilot: PilotId, bipolar: bool) -> list[str]:
+    def manual_control(
+        self, message: Any, *, received_ns: int, pilot: PilotId, bipolar: bool, lasts_ns: int
+    ) -> list[str]:
         """Take a MANUAL_CONTROL.
 
         Args:
@@ -169,63 +172,87 @@ class StickReader:
             received_ns: When it arrived, monotonic [ns].
             pilot: Who sent it.
             bipolar: Whether z runs from -1000 to 1000.
+            lasts_ns: How long what was said counts [ns].
 
         Returns:
             Functions of ``EDGE_BUTTONS`` whose button went down.
         """
-        old = self.sticks
-        stick = self._manual_axis(message, "stick")
-        lateral = self._manual_axis(message, "lateral")
-        yaw = self._manual_axis(message, "yaw")
-        lever = self._manual_lever(message, bipolar=bipolar)
-        nacelle = self._manual_axis(message, "nacelle")
         buttons = (message.buttons & 0xFFFF) | (message.buttons2 & 0xFFFF) << 16
-        self.sticks = replace_input(
-            old,
-            received_ns=received_ns,
-            stick=old.stick if stick is None else stick,
-            lateral=old.lateral if lateral is None else lateral,
-            yaw=old.yaw if yaw is None else yaw,
-            lever=old.lever if lever is None else lever,
-            stick_valid=stick is not None or old.stick_valid,
-            lever_valid=lever is not None or old.lever_valid,
-            nacelle_angle=math.nan if nacelle is None else deg(45.0 * (1.0 + nacelle)),
-            buttons=buttons,
-            owner=pilot.number,
-        )
-        aft, forward = self.function_held("nacelle_aft"), self.function_held("nacelle_forward")
-        trim = int(self.function_held("trim_forward")) - int(self.function_held("trim_aft"))
-        self.sticks = self.sticks._replace(nacelle_switch=int(aft) - int(forward), trim=trim)
-        pressed = buttons & ~old.buttons
+        held = {function: buttons >> number & 1 for function, number in self._buttons.items()}
+        given = {control: self._manual_axis(message, control) for control in ("stick", "lateral", "yaw")}
+        given["lever"] = self._manual_lever(message, bipolar=bipolar)
+        for control, value in given.items():  # an axis without a good value keeps its last one
+            kept = _live(self._manual, control, received_ns, lasts_ns) if value is None else value
+            if kept is not None:
+                self._manual[control] = kept, received_ns
+        nacelle = self._manual_axis(message, "nacelle")
+        self._manual.pop("nacelle", None)
+        if nacelle is not None:
+            self._manual["nacelle"] = nacelle, received_ns
+        self._manual["switch"] = held["nacelle_aft"] - held["nacelle_forward"], received_ns
+        self._manual["trim"] = held["trim_forward"] - held["trim_aft"], received_ns
+        self._manual["buttons"] = buttons, received_ns
+        pressed, self._held_down = buttons & ~self._held_down, buttons
+        self._merge(received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
         return [function for function in EDGE_BUTTONS if pressed >> self._buttons[function] & 1]
 
-    def override(self, message: Any, *, received_ns: int, pilot: PilotId) -> None:
-        """Take an RC_CHANNELS_OVERRIDE: roll, pitch (low PWM is stick forward), lever, yaw, nacelle switch, nacelle.
+    def gives_back(self, message: Any) -> bool:
+        """Whether an RC_CHANNELS_OVERRIDE releases a channel that one before it set.
+
+        Args:
+            message: The message.
+        """
+        return any(raw == _RELEASE and control in self._override for control, raw in _channels(message))
+
+    def override(self, message: Any, *, received_ns: int, pilot: PilotId, lasts_ns: int) -> None:
+        """Take an RC_CHANNELS_OVERRIDE: what it does not carry it leaves alone.
 
         Args:
             message: The message.
             received_ns: When it arrived, monotonic [ns].
             pilot: Who sent it.
+            lasts_ns: How long what was said counts [ns].
         """
-        old = self.sticks
-        raw = [int(getattr(message, f"chan{number}_raw")) for number in range(1, 7)]
-        roll, pitch, throttle, pedals, switch, nacelle = map(_pwm, raw)
-        released = {number: value == 0 for number, value in enumerate(raw, start=1)}
-        self.ignored_axes += sum(value not in {0, _IGNORE} and _pwm(value) is None for value in raw)
-        self.sticks = replace_input(
-            old,
-            received_ns=received_ns,
-            stick=old.stick if pitch is None else -pitch,
-            lateral=_kept(old.lateral, roll, released=released[1]),
-            yaw=_kept(old.yaw, pedals, released=released[4]),
-            lever=old.lever if throttle is None else 0.5 * (1.0 + throttle),
-            stick_valid=pitch is not None or (old.stick_valid and not released[2]),
-            lever_valid=throttle is not None or (old.lever_valid and not released[3]),
-            nacelle_switch=_kept_switch(old.nacelle_switch, switch, released=released[5]),
-            nacelle_angle=_kept_angle(old.nacelle_angle, nacelle, released=released[6]),
-            trim=0,
-            buttons=0,
+        for control, raw in _channels(message):
+            value = _pwm(raw)
+            if value is not None:
+                self._override[control] = _OVERRIDDEN[control](value), received_ns
+            elif raw == _RELEASE:
+                self._override.pop(control, None)
+            elif raw != _IGNORE:
+                self.ignored_axes += 1
+        self._merge(received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
+
+    def _merge(self, *, received_ns: int, pilot: PilotId, lasts_ns: int) -> None:
+        """Make one input of what both messages said lately; a channel that is overridden counts before an axis."""
+        self._stream = self._stream or received_ns
+        values: dict[str, float] = {}
+        heard: list[int] = []
+        overridden = 0
+        for said in (self._manual, self._override):
+            for control, (_, when) in said.items():
+                value = _live(said, control, received_ns, lasts_ns)
+                if value is not None:
+                    values[control] = value
+                    heard.append(when)
+                    if said is self._override:
+                        overridden |= _CHANNEL_BITS.get(control, 0)
+        self.sticks = StickInput(
+            sequence=self.sticks.sequence + 1,
+            received_ns=max(heard, default=self.sticks.received_ns),
+            stick=values.get("stick", 0.0),
+            lever=values.get("lever", 0.0),
+            lateral=values.get("lateral", 0.0),
+            yaw=values.get("yaw", 0.0),
+            stick_valid="stick" in values,
+            lever_valid="lever" in values,
+            nacelle_switch=int(values.get("switch", 0)),
+            nacelle_angle=deg(45.0 * (1.0 + values.get("nacelle", math.nan))),
+            trim=int(values.get("trim", 0)),
+            buttons=int(values.get("buttons", 0)),
             owner=pilot.number,
+            stream=self._stream,
+            overridden=overridden,
         )
 
     def _manual_axis(self, message: Any, control: str) -> float | None:
@@ -259,14 +286,24 @@ class StickReader:
         return value if sign > 0.0 else 1.0 - value
 
 
-def replace_input(old: StickInput, **changes: Any) -> StickInput:
-    """The next input after another one.
+def carries(message: Any) -> bool:
+    """Whether an RC_CHANNELS_OVERRIDE sets any channel that means something here.
 
     Args:
-        old: The one before.
-        **changes: Fields that differ.
+        message: The message.
     """
-    return old._replace(sequence=old.sequence + 1, **changes)
+    return any(_pwm(raw) is not None for _, raw in _channels(message))
+
+
+def _channels(message: Any) -> list[tuple[str, int]]:
+    """Controls and pulse widths of the channels that mean something here."""
+    return [(control, int(getattr(message, f"chan{number}_raw"))) for number, control in enumerate(_OVERRIDDEN, 1)]
+
+
+def _live(said: _Said, control: str, now_ns: int, lasts_ns: int) -> float | None:
+    """What was said about a control, unless that was too long ago."""
+    value, when = said.get(control, (0.0, -lasts_ns - 1))
+    return value if now_ns - when <= lasts_ns else None
 
 
 def _axis(control: str, source: str) -> tuple[int, float]:
@@ -287,20 +324,17 @@ def _pwm(raw: int) -> float | None:
     return min(max((raw - 1500) / 500.0, -1.0), 1.0)
 
 
-def _kept(old: float, new: float | None, *, released: bool) -> float:
-    """A shown axis: new where given, centred where released, else as it was."""
-    if new is not None:
-        return new
-    return 0.0 if released else old
+def _switch(value: float) -> int:
+    """The nacelle switch of a channel: low aft, high forward."""
+    return 1 if value < -0.4 else -1 if value > 0.4 else 0
 
 
-def _kept_switch(old: int, new: float | None, *, released: bool) -> int:
-    if new is None:
-        return 0 if released else old
-    return 1 if new < -0.4 else -1 if new > 0.4 else 0
-
-
-def _kept_angle(old: float, new: float | None, *, released: bool) -> float:
-    if new is None:
-        return math.nan if released else old
-    return deg(45.0 * (1.0 + new))
+_OVERRIDDEN: Mapping[str, Callable[[float], float]] = {
+    "lateral": float,
+    "stick": lambda value: -value,  # low is forward
+    "lever": lambda value: 0.5 * (1.0 + value),
+    "yaw": float,
+    "switch": _switch,
+    "nacelle": float,
+}
+"""What channels 1 to 6 of RC_CHANNELS_OVERRIDE are, and how a position from -1 to 1 is meant."""

@@ -34,6 +34,8 @@ _REAL32 = dialect.MAV_PARAM_TYPE_REAL32
 _NOT_FOUND, _OUT_OF_RANGE = 1, 2  # MAV_PARAM_ERROR: does not exist, value out of range
 _READ_ONLY = 3  # MAV_PARAM_ERROR: permission denied
 _MISSION_RESULTS = {
+    38: dialect.MAV_MISSION_UNSUPPORTED,  # MISSION_WRITE_PARTIAL_LIST
+    39: dialect.MAV_MISSION_UNSUPPORTED,  # MISSION_ITEM
     37: dialect.MAV_MISSION_UNSUPPORTED,  # MISSION_REQUEST_PARTIAL_LIST
     40: dialect.MAV_MISSION_INVALID_SEQUENCE,  # MISSION_REQUEST
     44: dialect.MAV_MISSION_UNSUPPORTED,  # MISSION_COUNT: an upload
@@ -56,13 +58,17 @@ class Services:
         self._outbox = outbox
         self._settling: dict[str, float] = {}
         self.answers: dict[int, Answerer] = {
-            4: self.ping,
             20: self.read_parameter,
             21: self.list_parameters,
             23: self.set_parameter,
             43: self.mission_count,
             110: self.refuse_file_transfer,
             111: self.timesync,
+            117: self.log_list,
+            119: self.log_data,
+            183: self.version,
+            320: self.extended_parameters,
+            321: self.extended_parameters,
             **dict.fromkeys(_MISSION_RESULTS, self.mission_result),
         }
         """What answers each message, by its id."""
@@ -219,6 +225,24 @@ class Services:
             frame.system_id, frame.component_id, result, getattr(message, "mission_type", 0)
         )
         self._outbox.reply(peer, answer)
+
+    # What there is none of: logs to download (the flight's own log stays where it is flown), parameters of text
+
+    def log_list(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
+        """Answer LOG_REQUEST_LIST: there are none."""
+        self._outbox.reply(peer, dialect.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+
+    def log_data(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
+        """Answer LOG_REQUEST_DATA: no bytes."""
+        self._outbox.reply(peer, dialect.MAVLink_log_data_message(message.id, message.ofs, 0, [0] * 90))
+
+    def extended_parameters(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
+        """Answer PARAM_EXT_REQUEST_LIST and _READ: none of them."""
+        self._outbox.reply(peer, dialect.MAVLink_param_ext_value_message(b"", b"", _REAL32, 0, 0))
+
+    def version(self, message: Any, frame: Frame, peer: Peer) -> None:  # noqa: ARG002 - as every answer
+        """Answer AUTOPILOT_VERSION_REQUEST, the old way to ask."""
+        self._outbox.reply(peer, self._outbox.factory.autopilot_version())
 
     # Clocks
 

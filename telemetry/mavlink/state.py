@@ -18,6 +18,8 @@ PILOT_MOCM, PILOT_EXTERNAL, PILOT_HOLD = 0, 1, 2
 """Values of the row's ``pilot_mode``."""
 INPUT_NONE, INPUT_LIVE, INPUT_LOST = 0, 1, 2
 """Values of ``Feedback.input_state``."""
+STALL_S = 1.0
+"""A flight that gives no sign of life for this long does not answer [s]."""
 VTOL_TO_AIRPLANE, VTOL_TO_HELICOPTER, VTOL_HELICOPTER, VTOL_AIRPLANE = 1, 2, 3, 4
 """MAV_VTOL_STATE."""
 
@@ -46,8 +48,13 @@ class FlightState:
     """MAV_VTOL_STATE."""
     worst_level: int = 0
     """Highest corridor level of the rows since the last tick."""
+    stalled: bool = False
+    """Whether the flight's process gives no sign of life though it flies or stands still on purpose."""
     _before_reset_s: float = 0.0
     _arrival_s: float = 0.0
+    _life_sign: int = 0
+    _life_sign_at: float = 0.0
+    _life_sign_gap: float = 0.0
 
     def observe(self, rows: FloatArray, now: float) -> bool:
         """Take new rows.
@@ -73,6 +80,23 @@ class FlightState:
         self.worst_level = max(self.worst_level, int(np.max(rows[:, COLUMN.corridor_level])))
         self._arrival_s = now
         return reset
+
+    def watch_flight(self, life_sign: int, now: float) -> bool:
+        """Notice whether the flight's process lives; one that is flown slowly may take its time.
+
+        Args:
+            life_sign: A count that it moves on; 0 while nothing flies.
+
+        Returns:
+            Whether that changed just now.
+        """
+        if life_sign != self._life_sign:
+            if self._life_sign:
+                self._life_sign_gap = max(now - self._life_sign_at, 0.9 * self._life_sign_gap)
+            self._life_sign, self._life_sign_at = life_sign, now
+        patience = max(STALL_S, 3.0 * self._life_sign_gap)
+        before, self.stalled = self.stalled, life_sign != 0 and now - self._life_sign_at > patience
+        return self.stalled != before
 
     def value(self, name: str) -> float:
         """A signal of the newest row; 0 where it is not finite.

@@ -10,7 +10,7 @@ from telemetry.mavlink.notices import INFO, WARNING
 from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import AID_PARAMETERS, LEVER_RANGE, LOSS_TIME, OWNER_TIME
 from telemetry.mavlink.peers import Peer
-from telemetry.mavlink.pilot_input import PilotId
+from telemetry.mavlink.pilot_input import PilotId, carries
 
 MANUAL_CONTROL, OVERRIDE = 69, 70
 """Ids of the two messages that carry sticks."""
@@ -30,6 +30,7 @@ class StickPort:
         self._outbox = outbox
         self._explained = False
         self._pilot: PilotId | None = None
+        self._bipolar = False
 
     def take(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int) -> None:
         """Take sticks from whoever holds them.
@@ -47,25 +48,34 @@ class StickPort:
             return
         pilot = PilotId(frame.system_id, frame.component_id, peer.address)
         before = outbox.lock.owner
+        lasts_ns = int(outbox.store[LOSS_TIME] * 1e9)
+        if not manual and not carries(message):
+            if before == pilot and outbox.reader.gives_back(message):
+                outbox.reader.override(message, received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
+                outbox.exchange.write_sticks(outbox.reader.sticks)
+            return  # none of our channels: that takes no sticks and keeps none
         if not outbox.lock.claim(pilot, now, release_after=outbox.store[OWNER_TIME]):
             if outbox.lock.allowed(frame.system_id):
                 board.say_seldom(f"refused {pilot}", WARNING, f"Sticks are held by {before}, not {pilot}", now)
             else:
-                board.say_seldom("whitelist", WARNING, f"System {frame.system_id} may not fly", now)
+                outbox.tell_once(frame.system_id, f"System {frame.system_id} may not fly")
             return
-        silent = received_ns - outbox.reader.sticks.received_ns > outbox.store[LOSS_TIME] * 1e9
-        if silent or pilot != self._pilot:  # what was held before must not come back with the first packet
+        bipolar = outbox.store[LEVER_RANGE] == 1.0
+        silent = received_ns - outbox.reader.sticks.received_ns > lasts_ns
+        if silent or (pilot, bipolar) != (self._pilot, self._bipolar):
+            # What was held before must not come back with the first packet, nor mean something else in another range.
             outbox.reader.forget(buttons=pilot != self._pilot)
-            self._pilot = pilot
+            self._pilot, self._bipolar = pilot, bipolar
         if before != outbox.lock.owner:
-            board.say(INFO, f"Sticks: {pilot}")
+            outbox.tell(INFO, f"Sticks: {pilot}")
         if manual:
-            bipolar = outbox.store[LEVER_RANGE] == 1.0
-            pressed = outbox.reader.manual_control(message, received_ns=received_ns, pilot=pilot, bipolar=bipolar)
+            pressed = outbox.reader.manual_control(
+                message, received_ns=received_ns, pilot=pilot, bipolar=bipolar, lasts_ns=lasts_ns
+            )
             for function in pressed:
                 self._press(function)
         else:
-            outbox.reader.override(message, received_ns=received_ns, pilot=pilot)
+            outbox.reader.override(message, received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
         sticks = outbox.reader.sticks
         outbox.exchange.write_sticks(sticks)
         outbox.exchange.header[ACCEPTED] += 1

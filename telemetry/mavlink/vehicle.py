@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
@@ -18,14 +19,15 @@ from telemetry.mavlink import messages as ids
 from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED, CommandContext, CommandHandler, command_values
 from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import (
+    ALIVE,
     ARMED,
     DISCARDED,
     PEERS,
     RECEIVED,
     Exchange,
 )
-from telemetry.mavlink.framing import Frame, SignatureCheck, decode, frames
-from telemetry.mavlink.notices import INFO, WARNING
+from telemetry.mavlink.framing import Frame, decode, frames
+from telemetry.mavlink.notices import CRITICAL, INFO, NOTICE, WARNING
 from telemetry.mavlink.outbox import Outbox
 from telemetry.mavlink.parameters import (
     FLAP_COMMAND,
@@ -35,15 +37,17 @@ from telemetry.mavlink.parameters import (
     WARNINGS,
     ParameterStore,
 )
-from telemetry.mavlink.peers import Address, Peer
+from telemetry.mavlink.peers import MOST_PEERS, Address, Peer
 from telemetry.mavlink.services import Services
+from telemetry.mavlink.signatures import SignatureCheck
 from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST
 from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
 
 LONGEST_PAUSE_S = 0.02
 """Changes in the flight are noticed at least this often [s]."""
 _LIST_PAUSE_S = 0.004
-_GROUND_HEARTBEAT, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 11, 75, 76
+_CHALLENGE_S = 0.3
+_GROUND_HEARTBEAT, _PING, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 4, 11, 75, 76
 
 
 class Vehicle(Outbox):
@@ -63,12 +67,17 @@ class Vehicle(Outbox):
             InputError: A setting, the signing key or the stored parameters are wrong.
         """
         super().__init__(config, exchange, send=send, now=now)
-        self._signatures = SignatureCheck(self.signing_key) if self.signing_key else None
+        self._signatures: SignatureCheck | None = None
+        if self.signing_key is not None:
+            self._signatures = SignatureCheck(self.signing_key, Path(f"{config.signing_key_file}.seen"))
+            if self._signatures.trouble:
+                self.tell_once("seen", f"Signatures from before this start are refused: {self._signatures.trouble}")
         self.services = Services(self)
         self._commands = CommandHandler(self, self.services)
         self._stick_port = StickPort(self)
         self._answers = {
             **self.services.answers,
+            _PING: self._take_ping,
             _SET_MODE: self._take_set_mode,
             _COMMAND_INT: self._take_command,
             _COMMAND_LONG: self._take_command,
@@ -77,7 +86,7 @@ class Vehicle(Outbox):
         self._decoder = dialect.MAVLink(None)
         self._identity: tuple[int, ...] = ()
         self._vtol_state = 0
-        self._input_state = 0
+        self._input_state = self._waiting = 0
         if config.parameter_file:
             self._load_parameters(config.parameter_file)
 
@@ -93,38 +102,60 @@ class Vehicle(Outbox):
         """
         self.now = now
         self.exchange.header[RECEIVED] += 1
-        known = self.peers.by_address.get(address)
-        bucket = known.incoming if known is not None else self.peers.strangers
-        if len(datagram) < 8 or datagram[0] not in {0xFD, 0xFE} or not bucket.take(now):
+        if len(datagram) < 8 or datagram[0] not in {0xFD, 0xFE} or not self.peers.looked_at(address, now):
             self.exchange.header[DISCARDED] += 1
             return
-        used = False
+        peer: Peer | None = None
         for frame in frames(datagram):
-            if frame.system_id in {0, self.config.system_id}:
+            if not self._may_act(frame, address):
                 continue
-            if self._signatures is not None and not self._signatures.accepts(frame):
-                continue
-            new = address not in self.peers.by_address
-            if new and self._signatures is not None and not frame.signed:
-                continue  # a radio may speak without a key, but that earns no telemetry
-            peer = self.peers.learn(address, now)
             if peer is None:
-                break
-            used = True
-            peer.ids.add((frame.system_id, frame.component_id))
-            if new or not peer.greeted:
-                peer.greeted = True
-                self._greet(peer)
+                peer = self.peers.learn(address, now, size=len(datagram))
+            peer.proved = peer.proved or (self._signatures is not None and frame.signed)
             if frame.message_id in self._handled:
                 message = decode(frame, self._decoder)
                 if message is not None:
                     self._dispatch(message, frame, peer, received_ns=received_ns, now=now)
-        if not used:
+        if peer is None:
             self.exchange.header[DISCARDED] += 1
+        else:
+            self._meet(peer)
+
+    def _may_act(self, frame: Frame, address: Address) -> bool:
+        """Whether a frame comes from somebody else and is signed where that is asked for."""
+        where = f"{address[0]}:{address[1]}"
+        if frame.system_id in {0, self.config.system_id}:
+            self.tell_once((address, frame.system_id), f"Ignored {where}: system {frame.system_id} is no station's id")
+            return False
+        if self._signatures is None:
+            return True
+        if not self._signatures.accepts(frame):
+            why = "its signature is wrong, old or dated ahead" if frame.signed else "not signed"
+            self.tell_once((address, frame.signed), f"Ignored {where}: {why}")
+            return False
+        # A radio may speak without a key, but that earns no telemetry.
+        return frame.signed or address in self.peers.by_address
+
+    def _meet(self, peer: Peer) -> None:
+        """Make a station of a sender that has shown itself to be one; ask the others to."""
+        if self.peers.accept(peer, self.now):
+            peer.greeted = False
+        if peer.accepted:
+            if not peer.greeted:
+                peer.greeted = True
+                self._greet(peer)
+        elif peer.proved:
+            self.tell_once("full", f"No room for {peer.address[0]}:{peer.address[1]}: {MOST_PEERS} stations are here")
+        elif self.now - peer.challenged >= _CHALLENGE_S:
+            peer.challenged = self.now
+            self.send(peer, self.factory.build(ids.HEARTBEAT)[0])
+            self.send(peer, dialect.MAVLink_ping_message(*self.peers.seal(peer, self.now), 0, 0))
 
     def _dispatch(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int, now: float) -> None:
         """Hand a message to whoever answers it."""
         number = frame.message_id
+        target = getattr(message, "target_system", getattr(message, "target", 0))
+        peer.addressed = peer.addressed or target == self.config.system_id
         if number in {MANUAL_CONTROL, OVERRIDE}:
             self._stick_port.take(message, frame, peer, received_ns=received_ns)
             return
@@ -154,6 +185,13 @@ class Vehicle(Outbox):
             self.reply(peer, extra)
         if answer.result == ACCEPTED:
             self._tell_changes()
+
+    def _take_ping(self, message: Any, frame: Frame, peer: Peer) -> None:
+        """A question, or the answer to ours, which shows that somebody hears us there."""
+        if message.target_system == 0:
+            self.services.ping(message, frame, peer)
+        elif (message.time_usec, message.seq) in {self.peers.seal(peer, self.now, age=age) for age in (0, 1)}:
+            peer.proved = True
 
     def _take_set_mode(self, message: Any, frame: Frame, peer: Peer) -> None:
         """The old way to change modes; acknowledged like the command that replaced it."""
@@ -199,6 +237,11 @@ class Vehicle(Outbox):
         feedback = self.exchange.read_feedback()
         if feedback is not None:
             self.state.feedback = feedback
+        if self.state.watch_flight(int(self.exchange.header[ALIVE]), now):
+            if self.state.stalled:
+                self.board.say(CRITICAL, "The flight does not answer: values are old")
+            else:
+                self.board.say(NOTICE, "The flight answers again")
         if self.state.started:
             self.state.update_vtol_state()
         self._follow_input()
@@ -228,6 +271,8 @@ class Vehicle(Outbox):
         heartbeat = self.factory.build(ids.HEARTBEAT)[0]
         heartbeat.system_status = dialect.MAV_STATE_POWEROFF
         self.broadcast(heartbeat)
+        if self._signatures is not None:
+            self._signatures.close()
 
     def _stream(self, now: float) -> None:
         """Send every stream that is due; each message is made once for all stations."""
@@ -236,8 +281,8 @@ class Vehicle(Outbox):
             if peer.parameter_next >= 0:
                 self.services.continue_list(peer)
             for number in peer.schedule.take_due(now):
-                if number != ids.HEARTBEAT and not self.state.started:
-                    continue
+                if number != ids.HEARTBEAT and (self.state.stalled or not self.state.started):
+                    continue  # what is not known any more is not repeated as if it were
                 if number not in made:
                     made[number] = self.factory.build(number)
                 for message in made[number]:
@@ -261,11 +306,17 @@ class Vehicle(Outbox):
         elif present == INPUT_LIVE and self._input_state == INPUT_LOST:
             self.board.say(INFO, "Sticks regained")
         self._input_state = present
+        waiting, self._waiting = self._waiting, int(self.state.feedback.waiting)
+        if self._waiting & ~waiting & 2:
+            lever = 100.0 * self.state.feedback.lever
+            self.board.say_seldom("lever", NOTICE, f"Lever stays at {lever:.0f} %: move yours through it", self.now)
+        if self._waiting & ~waiting & 1:
+            self.board.say_seldom("stick", NOTICE, "Stick stays at trim: centre yours first", self.now)
 
     def _look_after_peers(self, now: float) -> None:
         owner = self.lock.owner
         if self.lock.release_if_silent(now, release_after=self.store[OWNER_TIME]):
-            self.board.say(INFO, f"Sticks free, {owner} is silent")
+            self.tell(INFO, f"Sticks free, {owner} is silent")
         self.peers.forget_silent(now)
         for peer in self.peers.by_address.values():
             self.board.watch_peer(peer, now)

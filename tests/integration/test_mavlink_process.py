@@ -206,6 +206,17 @@ def test_with_a_key_only_signed_frames_act(open_link, tmp_path):
     signed.send(sticks(200), link.port)
     assert fly(link, 0.2, first=50)[-1].stick == 0.2
     assert unsigned.take() == wrong.take() == []
+    recorded = dialect.MAVLink_manual_control_message(1, 700, 0, 500, 0, 0).pack(signed.encoder)
+    signed.socket.sendto(recorded, ("127.0.0.1", link.port))
+    assert fly(link, 0.2, first=100)[-1].stick == 0.7
+    os.kill(link._process.pid, signal.SIGKILL)
+    end, number = time.monotonic() + 10.0, 150
+    while link.restarts == 0 or not link.ready:
+        number += len(fly(link, 0.1, first=number))
+        assert time.monotonic() < end
+    before = link.input.read().received_ns
+    signed.socket.sendto(recorded, ("127.0.0.1", link.port))  # played again to the new process
+    assert fly(link, 0.3, first=number)[-1].received_ns == before
     raw = [data for _, data in signed.take()]
     assert raw
     assert all(data[2] & 1 for data in raw)

@@ -265,6 +265,7 @@ def test_sticks_reach_the_aircraft_at_once_and_their_loss_is_handled(start, stat
     assert station.last["RC_CHANNELS"].chan2_raw == 1500
     assert station.last["RC_CHANNELS"].chan3_raw == pytest.approx(1000 + lever, abs=1)
     back = time.monotonic()
+    station.hold(0.2, z=lever)  # through the centre: nothing moves before
     station.hold(0.6, x=-200, z=lever)
     assert station.last["RC_CHANNELS"].chan2_raw == 1600
     assert any("regained" in m.text for _, m in station.since("STATUSTEXT", back))
@@ -467,9 +468,11 @@ def test_mavproxy_flies_it(start, tmp_path):
         console.type("arm throttle")
         console.expect("COMPONENT_ARM_DISARM: ACCEPTED")
         console.expect("ARMED")
+        console.type("rc 3 1760")
+        console.expect("your sticks fly")
+        time.sleep(0.3)
         console.type("rc 3 1700")
         console.type("rc 2 1450")
-        console.expect("your sticks fly")
         time.sleep(1.0)
         console.type("status RC_CHANNELS")
         console.expect(r"chan2_raw : 1450, chan3_raw : 1700")

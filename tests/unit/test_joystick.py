@@ -347,6 +347,80 @@ def test_the_sender_finds_any_vehicle_and_flies_it(air):
     assert (sticks.target, sticks.x, sticks.z, sticks.buttons) == (7, -500, 250, 1 << 5)
 
 
+def test_the_sender_waits_for_the_lever_as_long_as_it_takes(air, monkeypatch):
+    """The joystick may be started minutes before the flight has its first frame; it asks, and sends no sticks."""
+    sender, vehicle = air
+    for minute in range(3):
+        monkeypatch.setattr(sender, "_beat", -1e9)
+        vehicle.send(BEAT)
+        sender.poll()
+        monkeypatch.setattr(sender.vehicle, "heard", sender.vehicle.heard - 60.0 * minute)
+        assert not sender.knows_lever
+        assert vehicle.take().get_type() == "HEARTBEAT"
+        if minute == 0:
+            continue  # it may be telling anyway
+        asked = vehicle.take()
+        assert (asked.get_type(), asked.command, asked.param1) == ("COMMAND_LONG", 512, 65.0)
+
+
+def test_a_lever_without_a_place_follows_the_vehicle_while_nobody_moves_it(air):
+    from rtsim.cli.joystick import _follow_lever
+
+    sender, vehicle = air
+    mapper = Mapper(KEYBOARD_MAP)
+    vehicle.send(BEAT)
+    vehicle.send(dialect.MAVLink_rc_channels_message(1, 8, 1500, 1500, 1730, *[1500] * 5, *[65535] * 10, 100))
+    sender.poll()
+    _follow_lever(mapper, sender)
+    assert mapper.controls(DeviceState(), 0.02).lever == pytest.approx(0.73)
+    sender.fly(mapper.controls(DeviceState(lever_steps=0.1), 0.02))
+    _follow_lever(mapper, sender)
+    assert mapper.lever == pytest.approx(0.83)
+    for _ in range(100):
+        mapper.controls(DeviceState(), 0.02)
+    _follow_lever(mapper, sender)
+    assert mapper.lever == pytest.approx(0.83)  # any vehicle: its channels may be those of a radio
+    vehicle.send(dialect.MAVLink_named_value_float_message(1, b"nac_deg", 90.0))
+    sender.poll()
+    _follow_lever(mapper, sender)
+    assert mapper.lever == pytest.approx(0.73)
+
+
+@pytest.mark.parametrize("calls", [True, False])
+def test_only_the_vehicle_that_was_called_or_found_is_flown(calls):
+    """Heartbeats with its id from another address neither get the sticks nor answers."""
+    vehicle, stranger = Vehicle(0), Vehicle(0)
+    here = Endpoint(*vehicle.socket.getsockname())
+    sender = Sender(listen=None, connect=here) if calls else Sender(listen=Endpoint("127.0.0.1", 0), connect=None)
+    vehicle.to = stranger.to = ("127.0.0.1", sender.port)
+    stranger.socket.settimeout(0.05)
+    if calls:
+        stranger.send(BEAT)
+        sender.poll()
+        assert sender.vehicle.system_id == 0
+        assert vehicle.take().get_type() == "HEARTBEAT"
+    vehicle.send(BEAT)
+    sender.poll()
+    for _ in range(3):
+        stranger.send(BEAT)
+        stranger.send(dialect.MAVLink_rc_channels_message(1, 8, 1500, 1500, 1000, *[1500] * 5, *[65535] * 10, 100))
+        stranger.send(dialect.MAVLink_ping_message(1, 1, 0, 0))
+    sender.poll()
+    assert sender.vehicle.address == vehicle.socket.getsockname()
+    assert sender.vehicle.applied_lever is None
+    sender.fly(Controls())
+    with pytest.raises(TimeoutError):
+        stranger.take()
+    vehicle.send(dialect.MAVLink_ping_message(5, 6, 0, 0))
+    sender.poll()
+    while (answer := vehicle.take()).get_type() != "PING":
+        pass
+    assert (answer.time_usec, answer.seq, answer.target_system) == (5, 6, 7)
+    sender.close()
+    for end in (vehicle, stranger):
+        end.socket.close()
+
+
 def test_what_the_vehicle_says_is_kept(air):
     sender, vehicle = air
     vehicle.send(BEAT)

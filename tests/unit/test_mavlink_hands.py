@@ -101,9 +101,20 @@ def test_the_virtual_pilot_holds_until_sticks_arrive_and_no_control_steps(flight
     before = fly(flight, 50)
     assert set(before[:, COLUMN.pilot_mode]) == {0.0}
     live(flight, stick=0.4)
-    after = fly(flight, 50)
+    after = fly(flight, 250)
     assert set(after[:, COLUMN.pilot_mode]) == {1.0}
-    assert after[0, COLUMN.pilot_stick] == 0.4
+    # Nobody moved anything: the lever stays where the virtual pilot had it, and the stick waits for its centre.
+    assert np.ptp(after[:, COLUMN.pilot_lever]) == 0.0
+    assert np.max(np.abs(after[:, COLUMN.altitude_m] - before[-1, COLUMN.altitude_m])) < 1.0
+    assert flight.link.reports[-1].waiting == 3.0
+    live(flight)
+    fly(flight, 1)
+    live(flight, stick=0.4, lever=0.75)
+    moved = fly(flight, 80)
+    assert (moved[-1, COLUMN.pilot_stick], moved[-1, COLUMN.pilot_lever]) == (0.4, 0.75)
+    assert flight.link.reports[-1].waiting == 0.0
+    both = np.vstack((before, after, moved))
+    assert np.max(np.abs(np.diff(both[:, COLUMN.lever]))) <= 0.01
     both = np.vstack((before, after))
     assert np.max(np.abs(np.diff(both[:, COLUMN.stick]))) <= 0.02  # 1 % of the travel from -1 to 1
     assert np.max(np.abs(np.diff(both[:, COLUMN.lever]))) <= 0.01
@@ -208,6 +219,8 @@ def test_a_conversion_by_command_takes_the_controls_and_keeps_the_lever(flight):
 
 
 def test_lost_input_is_reported_and_the_lever_stays(flight):
+    live(flight, lever=0.9)
+    fly(flight, 2)
     live(flight, stick=0.2, lever=0.5)
     fly(flight, 600)
     flight.link.input.seconds = 1.0
@@ -234,6 +247,23 @@ def test_reset_and_freeze_go_to_the_executive_also_while_it_stands(flight):
     flight.control.poll()
     assert [request.action for request in flight.control.requests] == ["toggle-pause"]
     assert fly(flight, 1)[0, COLUMN.pilot_mode] == 2.0
+
+
+def test_what_ground_stations_do_to_the_flight_is_an_event(flight):
+    """A freeze and its end, nacelles and conversions by command, and what the MAVLink process has to tell."""
+    live(flight)
+    fly(flight, 1)
+    flight.link.on_note("Ignored 127.0.0.1:1: system 1 is no station's id")
+    flight.link.input.asked = [Request("nacelle", "", math.radians(80.0)), Request("transition", "", 3.0)]
+    fly(flight, 1)
+    flight.link.input.asked = [Request("freeze")]
+    fly(flight, 1)
+    flight.control.paused = True
+    flight.link.input.asked = [Request("freeze")]
+    flight.control.poll()
+    fly(flight, 1)
+    kinds = [event.kind for event in flight.events]
+    assert kinds == ["pilot", "mavlink", "nacelle", "transition", "freeze", "thaw"]
 
 
 def test_what_is_asked_for_after_a_reset_acts_after_it(flight):
@@ -268,7 +298,9 @@ def test_a_gentle_touchdown_completes_a_hand_flight():
         simulation, frames=10_000, hands=Hands(link, simulation, control=FlightControl(), waits=True)
     )
     trim = session.step()[COLUMN.lever]
-    link.input.sticks, link.input.seconds = FLYING._replace(lever=trim - 0.02), 0.0
+    link.input.sticks, link.input.seconds = FLYING._replace(lever=trim + 0.02), 0.0
+    session.step()
+    link.input.sticks = FLYING._replace(lever=trim - 0.02)
     while not session.finished:
         session.step()
     assert "touched down gently" in session.end_reason

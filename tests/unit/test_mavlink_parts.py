@@ -19,11 +19,12 @@ from rtsim.errors import InputError
 from telemetry.exchange.child_process import child_environment
 from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, Ratings, endpoints, read_signing_key
 from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
-from telemetry.mavlink.framing import SignatureCheck, frames, signature_time
+from telemetry.mavlink.framing import frames, signature_time
 from telemetry.mavlink.notices import FLAP_SPEEDS
 from telemetry.mavlink.parameters import AID_PARAMETERS, PARAMETERS, ParameterStore
 from telemetry.mavlink.peers import TokenBucket
 from telemetry.mavlink.pilot_input import StickReader
+from telemetry.mavlink.signatures import SignatureCheck
 from telemetry.mavlink.streams import StreamSchedule
 
 KEY = bytes(range(32))
@@ -168,6 +169,59 @@ def test_signatures_are_checked():
     assert check.accepts(one(packed(radio)))
     old = BEAT.pack(dialect.MAVLink(None, srcSystem=255, srcComponent=1), force_mavlink1=True)
     assert not check.accepts(one(old))
+
+
+def test_signed_frames_are_not_accepted_again_after_a_restart(tmp_path):
+    """Whether the vehicle was closed or killed; and the station goes on within a second."""
+    kept = tmp_path / "key.seen"
+    first = SignatureCheck(KEY, kept)
+    now = signature_time()
+    seen = [one(packed(BEAT, key=KEY, stamp=now + number)) for number in range(5)]
+    assert all(first.accepts(frame) for frame in seen)
+    killed = SignatureCheck(KEY, kept)
+    assert not any(killed.accepts(frame) for frame in seen)
+    assert killed.accepts(one(packed(BEAT, key=KEY, stamp=now + 100_001)))
+    killed.close()
+    closed = SignatureCheck(KEY, kept)
+    assert not any(closed.accepts(frame) for frame in seen)
+    assert closed.accepts(one(packed(BEAT, key=KEY, stamp=now + 100_002)))
+
+
+@pytest.mark.parametrize("damage", ["unreadable", "folder", "unwritable"])
+def test_where_stamps_cannot_be_kept_only_those_since_the_start_count(tmp_path, damage):
+    kept = tmp_path / "key.seen"
+    if damage == "unreadable":
+        kept.write_text("\x00[1, 2")
+    elif damage == "folder":
+        kept.mkdir()
+    else:
+        kept = tmp_path / "nowhere" / "key.seen"
+    old = one(packed(BEAT, key=KEY, stamp=signature_time() - 1000))
+    check = SignatureCheck(KEY, kept)
+    assert check.trouble
+    assert not check.accepts(old)
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=signature_time() + 1000)))
+
+
+def test_a_frame_dated_ahead_is_refused_and_locks_nobody_out():
+    check = SignatureCheck(KEY)
+    now = signature_time()
+    assert not check.accepts(one(packed(BEAT, key=KEY, stamp=now + 3600 * 100_000)))
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=now + 50 * 100_000)))
+    assert check.accepts(one(packed(BEAT, key=KEY, link=3, stamp=now - 50 * 100_000)))
+    assert check.accepts(one(packed(BEAT, key=KEY, link=4, stamp=now)))
+
+
+def test_many_streams_lock_nobody_out(monkeypatch):
+    from telemetry.mavlink import signatures
+
+    check = SignatureCheck(KEY)
+    now = signature_time()
+    monkeypatch.setattr(signatures, "_MOST_STREAMS", 8)
+    assert all(check.accepts(one(packed(BEAT, key=KEY, link=link, stamp=now))) for link in range(20))
+    monkeypatch.setattr(signatures, "signature_time", lambda: now + 61 * 100_000)
+    assert check.accepts(one(packed(BEAT, key=KEY, link=99, stamp=now + 61 * 100_000)))
+    assert not check.accepts(one(packed(BEAT, key=KEY, link=5, stamp=now)))
 
 
 def test_signing_keys_are_read_from_private_files(tmp_path):

@@ -12,10 +12,11 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.mavlink.config import MavlinkConfig
-from telemetry.mavlink.exchange import Exchange, Feedback, Request
+from telemetry.mavlink.exchange import ALIVE, Exchange, Feedback, Request
 from telemetry.mavlink.peers import MOST_PEERS
 from telemetry.mavlink.vehicle import Vehicle
 
+HEARTBEAT = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 GROUND = ("127.0.0.1", 14550)
 OTHER = ("127.0.0.1", 14999)
 AIDS = {"rate_damping": True, "attitude_retention": True, "altitude_hold": False, "airspeed_hold": False}
@@ -69,6 +70,15 @@ class Bench:
 
     def receive(self, data, address=GROUND):
         self.vehicle.receive(bytes(data), address, received_ns=int(self.now * 1e9), now=self.now)
+
+    def join(self, address, *, answer=True):
+        """Send a heartbeat and answer the PING that comes back, as ground stations do; gives what came before it."""
+        self.send(HEARTBEAT, address=address)
+        came = self.taken(address=address)
+        ping = next(message for message in came if message.get_type() == "PING")
+        if answer:
+            self.send(dialect.MAVLink_ping_message(ping.time_usec, ping.seq, 1, 1), address=address)
+        return came
 
     def fly(self, seconds):
         """Frames of 20 ms, each with a row and a tick."""
@@ -361,7 +371,7 @@ def test_reboot_resets_only_where_it_may():
 
 
 def test_message_intervals_are_per_station(bench):
-    bench.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), address=OTHER)
+    bench.join(OTHER)
     assert bench.command(511, 30.0, 100_000.0) == 0
     bench.sent.clear()
     bench.fly(2.0)
@@ -507,7 +517,7 @@ def test_parameters_are_set_and_checked(bench):
 
 
 def test_a_changed_parameter_is_told_to_everybody(bench):
-    bench.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), address=OTHER)
+    bench.join(OTHER)
     bench.sent.clear()
     set_parameter(bench, "XV_NAC_RATE", 5.0)
     assert [message.param_value for message in bench.taken("PARAM_VALUE", OTHER)] == [5.0]
@@ -674,6 +684,90 @@ def test_rc_override(bench):
     assert bench.vehicle.reader.ignored_axes == 2
 
 
+NOT_OURS = {f"chan{number}_raw": 1500 for number in range(9, 19)}
+"""What QGroundControl sends beside MANUAL_CONTROL: channels from 9 on."""
+
+
+@pytest.mark.parametrize("ignored", [[65535] * 8, [65534] * 8, [65535, 0, 65534, 0, 65535, 65535, 1700, 1200]])
+def test_an_override_that_carries_none_of_our_channels_touches_nothing(bench, ignored):
+    """A held button acts once, held trim and axes go on, and it neither takes the sticks nor keeps them alive."""
+    bench.send(override(*ignored, **NOT_OURS), address=OTHER)
+    assert bench.vehicle.lock.owner is None
+    assert bench.exchange.read_sticks().sequence == 0
+    for number in range(50):
+        bench.send(manual(x=300, z=700, buttons=1 << 6 | 1 << 9 | 1 << 11 | 1 << 5))
+        bench.send(override(*ignored, **NOT_OURS))
+        sticks = bench.exchange.read_sticks()
+        assert (sticks.stick, sticks.lever, sticks.trim, sticks.nacelle_switch) == (0.3, 0.7, 1, -1), number
+        bench.fly(0.02)
+    assert bench.requests() == [Request("aid", "rate_damping", 2.0), Request("pilot", "next")]
+    last = bench.exchange.read_sticks().received_ns
+    for _ in range(50):
+        bench.fly(0.06)
+        bench.send(override(*ignored, **NOT_OURS))
+    assert bench.exchange.read_sticks().received_ns == last
+    assert bench.vehicle.lock.owner is None
+
+
+def test_an_override_takes_the_channels_it_carries_and_gives_them_back(bench):
+    bench.send(manual(x=300, z=700, buttons=1 << 4))
+    bench.send(override(65535, 65535, 1400))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.stick, sticks.lever, sticks.nacelle_switch) == (0.3, pytest.approx(0.4), 1)
+    assert sticks.overridden == 2
+    bench.send(manual(x=310, z=710))
+    assert bench.exchange.read_sticks().lever == pytest.approx(0.4)
+    bench.send(override(65535, 65535, 0))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lever, sticks.overridden) == (0.71, 0)
+    bench.send(override(65535, 65535, 1400))
+    bench.fly(0.6)  # an override that is not repeated ends
+    bench.send(manual(x=310, z=720))
+    assert bench.exchange.read_sticks().lever == 0.72
+
+
+def test_a_channel_or_button_that_is_no_longer_sent_ends_though_others_go_on(bench):
+    bench.send(manual(x=300, z=700, buttons=1 << 5))
+    bench.send(override(65535, 1400, 1600))
+    for _ in range(40):
+        bench.fly(0.02)
+        bench.send(override(65535, 65535, 1600))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.stick_valid, sticks.lever_valid, sticks.nacelle_switch, sticks.buttons) == (False, True, 0, 0)
+
+
+def test_another_pilot_and_input_that_is_back_are_other_streams(bench):
+    bench.send(manual())
+    streams = [bench.exchange.read_sticks().stream]
+    bench.fly(0.1)
+    bench.send(manual())
+    assert bench.exchange.read_sticks().stream == streams[0] > 0
+    bench.fly(0.7)
+    bench.send(manual())
+    streams.append(bench.exchange.read_sticks().stream)
+    bench.fly(2.2)
+    bench.send(manual(), address=OTHER)
+    streams.append(bench.exchange.read_sticks().stream)
+    assert len(set(streams)) == 3
+
+
+def test_another_range_of_the_lever_is_another_hand(bench):
+    bench.send(manual(z=700))
+    before = bench.exchange.read_sticks().stream
+    bench.fly(0.1)
+    set_parameter(bench, "XV_Z_BIPOLAR", 1.0)
+    bench.send(manual(z=700))
+    assert bench.exchange.read_sticks().stream != before
+
+
+def test_controls_that_wait_for_their_hand_are_told(bench):
+    bench.feedback = bench.feedback._replace(waiting=3.0, lever=0.73)
+    bench.fly(1.0)
+    texts = bench.texts()
+    assert any("Lever stays at 73 %" in text for text in texts)
+    assert any("centre yours" in text for text in texts)
+
+
 def test_the_first_pilot_owns_the_sticks_until_it_is_silent(bench):
     bench.send(manual(x=100))
     bench.send(manual(x=900), address=OTHER)  # the same ids from another address are another program
@@ -794,6 +888,23 @@ def test_timesync_ping_missions_and_files(bench):
     assert (answer.payload[0], answer.payload[3], answer.payload[5]) == (8, 129, 4)
 
 
+@pytest.mark.parametrize(
+    ("request_message", "answer", "told"),
+    [
+        (dialect.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF), "LOG_ENTRY", {"num_logs": 0, "last_log_num": 0}),
+        (dialect.MAVLink_log_request_data_message(1, 1, 3, 90, 900), "LOG_DATA", {"id": 3, "ofs": 90, "count": 0}),
+        (dialect.MAVLink_param_ext_request_list_message(1, 1), "PARAM_EXT_VALUE", {"param_count": 0}),
+        (dialect.MAVLink_mission_write_partial_list_message(1, 1, 0, 3), "MISSION_ACK", {"type": 3}),
+        (dialect.MAVLink_autopilot_version_request_message(1, 1), "AUTOPILOT_VERSION", {}),
+    ],
+)
+def test_what_there_is_none_of_is_said_at_once(bench, request_message, answer, told):
+    bench.taken()
+    bench.send(request_message)
+    (message,) = bench.taken(answer)
+    assert {name: getattr(message, name) for name in told} == told
+
+
 def test_garbage_makes_no_peer_and_gets_no_answer(bench):
     bench.sent.clear()
     rng = np.random.default_rng(1)
@@ -823,10 +934,132 @@ def test_own_ids_are_not_a_station(bench):
 
 def test_stations_are_few_and_forgotten_when_silent(bench):
     for port in range(20):
-        bench.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), address=("127.0.0.1", 20_000 + port))
+        bench.join(("127.0.0.1", 20_000 + port))
     assert len(bench.vehicle.peers.by_address) == MOST_PEERS + 1
     bench.fly(11.0)
     assert set(bench.vehicle.peers.by_address) == {GROUND}  # the configured target stays
+    assert bench.vehicle.peers.strangers == {}
+
+
+def earned(bench, address):
+    return sum(len(data) for data, to in bench.sent if to == address)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "192.0.2.7"])
+@pytest.mark.parametrize("kind", ["heartbeat", "list", "commands", "sticks"])
+def test_an_address_that_answers_nothing_earns_three_bytes_for_each(bench, host, kind):
+    """Whoever sends in its name: one packet, or one a second for ever (heartbeats), or one burst of requests."""
+    address = (host, 5555)
+    messages = {
+        "heartbeat": [HEARTBEAT] * 20,
+        "list": [dialect.MAVLink_param_request_list_message(1, 1)] * 20,
+        "commands": [
+            dialect.MAVLink_command_long_message(1, 1, 512, 0, float(number), *[0.0] * 6) for number in (148, 435)
+        ]
+        * 10,
+        "sticks": [manual()],
+    }[kind]
+    spent = 0
+    for number, message in enumerate(messages):
+        spent += len(message.pack(dialect.MAVLink(None)))
+        bench.send(message, address=address)
+        bench.fly(0.9 if kind == "heartbeat" else 0.02)
+        assert earned(bench, address) <= 3 * spent, number
+    bench.fly(12.0)
+    assert earned(bench, address) <= 3 * spent
+    assert address not in bench.vehicle.peers.by_address
+
+
+def test_a_station_that_answers_our_ping_is_served_at_once(bench):
+    address = ("192.0.2.7", 14550)
+    came = bench.join(address, answer=False)
+    assert came[0].get_type() == "HEARTBEAT"
+    ping = came[-1]
+    for wrong in ((ping.time_usec ^ 1, ping.seq), (0, 0)):
+        bench.send(dialect.MAVLink_ping_message(*wrong, 1, 1), address=address)
+    other = ("192.0.2.8", 14550)  # what one address was told is worth nothing at another
+    bench.send(dialect.MAVLink_ping_message(ping.time_usec, ping.seq, 1, 1), address=other)
+    assert set(bench.vehicle.peers.by_address) == {GROUND}
+    bench.send(dialect.MAVLink_ping_message(ping.time_usec, ping.seq, 1, 1), address=address)
+    bench.fly(0.1)
+    assert len(bench.taken("ATTITUDE", address)) >= 4
+
+
+def test_a_program_of_this_machine_that_talks_on_is_served(bench):
+    """A script that answers no PING: heartbeats and a request, as all of them send."""
+    for _ in range(3):
+        bench.send(HEARTBEAT, address=OTHER)
+        bench.send(dialect.MAVLink_param_request_list_message(1, 1), address=OTHER)
+        bench.fly(0.6)
+    bench.fly(0.5)
+    names = {message.get_type() for message in bench.taken(address=OTHER)}
+    assert {"ATTITUDE", "PARAM_VALUE"} <= names
+    bench.fly(4.0)
+    assert OTHER not in bench.vehicle.peers.by_address  # and no longer than it talks
+
+
+def test_strangers_crowd_out_nobody(bench):
+    bench.join(OTHER)
+    bench.sent.clear()
+    for number in range(3000):
+        bench.send(HEARTBEAT, address=("127.0.0.1", 20_000 + number))
+        if number % 100 == 0:
+            bench.fly(0.02)
+            bench.send(HEARTBEAT, address=OTHER)
+    late = ("127.0.0.1", 15_000)
+    while late not in bench.vehicle.peers.by_address:  # its group may be used up for a moment
+        bench.fly(0.1)
+        bench.send(HEARTBEAT, address=late)
+        for ping in bench.taken("PING", late):
+            bench.send(dialect.MAVLink_ping_message(ping.time_usec, ping.seq, 1, 1), address=late)
+        assert bench.now < 1010.0
+    assert {GROUND, OTHER, late} == set(bench.vehicle.peers.by_address)
+    assert len(bench.vehicle.peers.strangers) <= 32
+    bench.sent.clear()
+    bench.fly(1.0)
+    assert len(bench.taken("ATTITUDE", OTHER)) == pytest.approx(50, abs=2)
+
+
+def test_rates_are_for_stations_and_a_station_has_a_budget(bench):
+    bench.send(HEARTBEAT, address=OTHER)
+    bench.fly(0.5)
+    assert bench.command(511, 30.0, 4000.0, address=OTHER) == 1
+    assert bench.command(511, 30.0, 4000.0, system=42) == 2
+    bench.fly(1.0)
+    for number in (30, 31, 32, 33, 74, 251, 350, 65, 36, 141, 24, 147, 242, 2, 436, 1, 245):
+        assert bench.command(511, float(number), 1.0) == 0
+    bench.sent.clear()
+    bench.vehicle.peers.by_address[GROUND].volume.take(bench.now, 90_000.0)
+    for _ in range(1000):
+        bench.now += 0.004
+        bench.vehicle.tick(bench.now)
+    assert earned(bench, GROUND) <= 4.0 * 100_000 + 20_000
+    assert len(bench.taken("HEARTBEAT")) >= 3
+
+
+@pytest.mark.parametrize(("system", "component"), [(1, 1), (1, 191), (0, 190)])
+def test_a_sender_that_is_ignored_is_told_once(bench, system, component):
+    for _ in range(5):
+        bench.send(manual(), system=system, component=component, address=OTHER)
+        bench.fly(0.6)
+    told = [f"Ignored 127.0.0.1:14999: system {system} is no station's id"]
+    assert bench.exchange.take_notes() == told
+    assert [text for text in bench.texts() if "Ignored" in text] == [told[0][:50]]
+    assert bench.exchange.read_sticks().sequence == 0
+
+
+def test_who_arms_and_who_flies_are_events_of_the_flight(bench):
+    bench.command(400, 1.0)
+    bench.send(manual())
+    bench.fly(2.2)
+    assert bench.exchange.take_notes() == ["Armed", "Sticks: 255/190", "Sticks free, 255/190 is silent"]
+
+
+def test_a_system_that_may_not_fly_is_told_once(bench):
+    for _ in range(5):
+        bench.send(manual(), system=42, address=OTHER)
+        bench.fly(3.0)
+    assert bench.exchange.take_notes() == ["System 42 may not fly"]
 
 
 def test_a_missing_ground_station_is_noticed(bench):
@@ -846,7 +1079,7 @@ def test_answers_are_budgeted(bench):
 
 
 def test_sequence_numbers_are_whole_for_each_station(bench):
-    bench.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), address=OTHER)
+    bench.join(OTHER)
     bench.sent.clear()
     bench.command(511, 30.0, -1.0)
     bench.sent.clear()
@@ -866,6 +1099,47 @@ def test_nothing_that_does_not_fit_a_field_ends_the_vehicle(bench):
     bench.fly(2.1)
     attitude = bench.taken("ATTITUDE")[-1]
     assert math.isfinite(attitude.pitch)
+
+
+def test_a_flight_that_does_not_answer_is_told_and_not_shown_as_if_it_flew(bench):
+    """Its process is stopped: no frames, and not the life sign of one that stands still on purpose."""
+    header = bench.exchange.header
+
+    def wait(seconds, *, lives):
+        for _ in range(round(seconds / 0.02)):
+            header[ALIVE] += lives
+            bench.now += 0.02
+            bench.vehicle.tick(bench.now)
+
+    wait(2.0, lives=1)  # paused
+    assert len(bench.taken("ATTITUDE")) > 90
+    wait(1.1, lives=0)
+    beat = bench.taken("HEARTBEAT")[-1]
+    assert beat.system_status == dialect.MAV_STATE_EMERGENCY
+    wait(2.5, lives=0)
+    messages = bench.taken()
+    assert {message.get_type() for message in messages} <= {"HEARTBEAT", "STATUSTEXT"}
+    assert all(m.system_status == dialect.MAV_STATE_EMERGENCY for m in messages if m.get_type() == "HEARTBEAT")
+    wait(0.5, lives=1)
+    messages = bench.taken()
+    assert any("answers again" in m.text for m in messages if m.get_type() == "STATUSTEXT")
+    assert next(m for m in messages if m.get_type() == "HEARTBEAT").system_status == dialect.MAV_STATE_STANDBY
+    assert "ATTITUDE" in {message.get_type() for message in messages}
+    header[ALIVE] = 0  # over
+    wait(5.0, lives=0)
+    assert not bench.vehicle.state.stalled
+
+
+def test_a_flight_in_slow_motion_is_not_taken_for_dead(bench):
+    """Its frames are seconds apart."""
+    told = []
+    for frame in range(10):
+        bench.exchange.header[ALIVE] += 1
+        for _ in range(200):
+            bench.now += 0.02
+            bench.vehicle.tick(bench.now)
+            told += [frame] * bench.vehicle.state.stalled
+    assert set(told) <= {0}
 
 
 def test_farewell(bench):

@@ -19,7 +19,8 @@ from rtsim.units import deg, kt, to_deg
 
 DT = 0.004
 HELICOPTER = StickSituation(airspeed=0.0, nacelle_command=deg(90.0))
-LIVE = StickInput(sequence=1, received_ns=1, stick_valid=True, lever_valid=True, lever=0.5)
+LIVE = StickInput(sequence=1, received_ns=1, stream=1, stick_valid=True, lever_valid=True, lever=0.6)
+"""A hand whose lever is where the aircraft's is, and whose stick is centred: it has both at once."""
 
 
 def handler(settings=None, **options):
@@ -57,9 +58,29 @@ def test_a_live_stick_is_applied_in_the_frame_that_reads_it():
         assert command.lever == 0.2
 
 
-def test_sticks_that_come_fade_in_within_the_blend_time():
+@pytest.mark.parametrize("lever", [0.0, 0.5, 0.9, 1.0])
+def test_a_lever_nobody_moved_moves_nothing(lever):
     hands = handler()
-    commands, _ = fly(hands, LIVE._replace(stick=0.5, lever=0.9), frames=60)
+    commands, _ = fly(hands, LIVE._replace(lever=lever, stick=0.4), frames=500)
+    assert {command.lever for command in commands} == {0.6}
+    assert {command.stick for command in commands} == {0.0}
+    assert hands.waiting == 3
+
+
+def test_a_lever_is_taken_by_moving_through_it():
+    hands = handler()
+    hand = np.linspace(0.5, 0.8, 61).tolist()
+    levers = [fly(hands, LIVE._replace(lever=lever), frames=1)[0][0].lever for lever in hand]
+    assert set(levers[:20]) == {0.6}
+    assert np.max(np.abs(np.diff(levers))) <= 0.01
+    assert fly(hands, LIVE._replace(lever=0.3), frames=60)[0][-1].lever == 0.3
+    assert hands.waiting == 0
+
+
+def test_a_step_through_the_lever_fades_in():
+    hands = handler()
+    fly(hands, LIVE._replace(lever=0.5), frames=5)
+    commands, _ = fly(hands, LIVE._replace(lever=0.9), frames=60)
     levers = np.array([0.6, *(command.lever for command in commands)])
     assert np.all(np.diff(levers) >= 0.0)
     assert np.max(np.abs(np.diff(levers))) <= 0.01
@@ -67,8 +88,54 @@ def test_sticks_that_come_fade_in_within_the_blend_time():
     assert levers[25] < 0.9  # still fading at 0.1 s
 
 
+def test_a_lever_moved_away_takes_the_held_one_along():
+    """By as much as the hand moved, whatever it shakes, and it has the lever once it comes back through it."""
+    hands = handler()
+    for lever in (0.5, 0.505, 0.498, 0.5, 0.4, 0.45, 0.4):
+        last = fly(hands, LIVE._replace(lever=lever), frames=5)[0][-1].lever
+    assert last == pytest.approx(0.5)
+    fly(hands, LIVE._replace(lever=0.51), frames=60)
+    assert fly(hands, LIVE._replace(lever=0.2), frames=1)[0][0].lever == 0.2
+
+
+@pytest.mark.parametrize("change", [{"stream": 2}, {"overridden": 3}, {"age": 1.0}, {"engage": Command(0.0, 0.5, 0.0)}])
+def test_another_hand_waits_until_it_moves(change):
+    """Another owner or message, input that is back after a loss, another pilot before: the lever stays."""
+    hands = handler()
+    fly(hands, LIVE._replace(lever=0.6), frames=5)
+    fly(hands, LIVE._replace(lever=0.5, stick=0.2), frames=100)
+    if "age" in change:
+        fly(hands, LIVE, frames=200, age=1.0)
+    elif "engage" in change:
+        hands.engage(change["engage"])
+    other = LIVE._replace(lever=0.9, stick=-0.6, **{key: value for key, value in change.items() if key in LIVE._fields})
+    commands, _ = fly(hands, other, frames=300)
+    assert {command.lever for command in commands} == {0.5}
+    assert commands[-1].stick == 0.0
+    last = fly(hands, other._replace(lever=0.4, stick=0.1), frames=100)[0][-1]
+    assert (last.stick, last.lever) == (0.1, 0.4)
+
+
+def test_what_was_moved_while_the_flight_stood_still_fades_in():
+    hands = handler()
+    fly(hands, LIVE, frames=5)
+    hands.go_on()
+    commands, _ = fly(hands, LIVE._replace(stick=0.5, lever=0.2), frames=60)
+    levers = np.array([0.6, *(command.lever for command in commands)])
+    assert np.max(np.abs(np.diff(levers))) <= 0.0101
+    assert (commands[-1].stick, levers[-1]) == (0.5, 0.2)
+
+
+def test_a_stick_that_appears_among_inputs_that_go_on_acts():
+    """Somebody gave an override channel a value; a stick nobody had was centred."""
+    hands = handler()
+    fly(hands, LIVE._replace(stick_valid=False), frames=10)
+    assert fly(hands, LIVE._replace(stick=0.3), frames=100)[0][-1].stick == 0.3
+
+
 def test_lost_input_centres_the_stick_and_holds_lever_and_nacelle():
     hands = handler()
+    fly(hands, LIVE, frames=1)
     moving = LIVE._replace(stick=0.6, lever=0.4, nacelle_switch=-1)
     fly(hands, moving, frames=200, situation=StickSituation(0.0, deg(85.0)))
     last = hands.step(moving, age=0.5, situation=HELICOPTER, dt=DT)
@@ -86,9 +153,12 @@ def test_lost_input_centres_the_stick_and_holds_lever_and_nacelle():
 
 def test_regained_input_has_no_step_and_arrives():
     hands = handler()
+    fly(hands, LIVE, frames=1)
     fly(hands, LIVE._replace(stick=0.6, lever=0.4), frames=200)
     fly(hands, LIVE, frames=200, age=1.0)
-    commands, _ = fly(hands, LIVE._replace(sequence=2, stick=-1.0, lever=1.0), frames=110)
+    back = LIVE._replace(sequence=2, stream=2)
+    fly(hands, back._replace(stick=0.1, lever=0.3), frames=1)
+    commands, _ = fly(hands, back._replace(stick=-1.0, lever=1.0), frames=110)
     sticks = np.array([0.0, *(command.stick for command in commands)])
     levers = np.array([0.4, *(command.lever for command in commands)])
     assert np.max(np.abs(np.diff(sticks))) <= 0.0201
@@ -99,6 +169,7 @@ def test_regained_input_has_no_step_and_arrives():
 
 def test_a_released_channel_is_lost_alone():
     hands = handler()
+    fly(hands, LIVE, frames=1)
     fly(hands, LIVE._replace(stick=0.6), frames=200)
     commands, _ = fly(hands, LIVE._replace(stick=0.6, stick_valid=False, lever=0.3), frames=100)
     assert commands[-1].stick == 0.0
@@ -155,6 +226,8 @@ def test_an_absolute_angle_is_reached_exactly_and_the_switch_overrules_it():
 
 def test_an_axis_commands_when_it_moves_and_not_while_it_rests():
     hands = handler()
+    rest = LIVE._replace(nacelle_angle=deg(45.0))
+    assert set(fly(hands, rest, frames=100)[1]) == {deg(90.0)}  # there from the first: nobody moved it
     axis = LIVE._replace(nacelle_angle=deg(80.0))
     _, angles = fly(hands, axis, frames=1000)
     assert to_deg(angles[-1]) == pytest.approx(80.0, abs=1e-9)
@@ -203,11 +276,7 @@ def test_without_a_schedule_there_is_no_transition():
     assert not handler(schedule=transition_schedule(load_corridor("design"))).start_transition(1)
 
 
-def test_taking_over_follows_live_sticks_at_once_and_keeps_the_lever_otherwise():
-    hands = handler()
-    fly(hands, LIVE, frames=100)
-    hands.engage(Command(0.2, 0.7, 0.0))
-    assert fly(hands, LIVE._replace(stick=0.1), frames=1)[0][0].stick == 0.1
+def test_taking_over_keeps_the_lever_without_sticks():
     idle = handler()
     idle.engage(Command(0.2, 0.7, 0.0))
     assert fly(idle, StickInput(), frames=1, age=math.inf)[0][0].lever == 0.7
@@ -240,26 +309,34 @@ def test_shape_is_odd_monotonic_and_reaches_full_travel(dead_band, expo, scale, 
 
 @given(
     st.lists(
-        st.tuples(st.floats(-1, 1), st.floats(0, 1), st.booleans(), st.booleans(), st.floats(0, 1)),
+        st.tuples(
+            *(st.floats(-1, 1), st.floats(0, 1), st.booleans(), st.booleans()),
+            *(st.floats(0, 1), st.integers(1, 2), st.integers(0, 3)),
+        ),
         min_size=1,
         max_size=40,
     )
 )
 def test_no_step_beyond_the_hands_own(inputs):
-    """Whatever comes and goes, a control moves by at most its fade rate plus what the hand itself moved."""
+    """Whatever comes and goes, a control moves by at most its fade rate plus what its hand itself moved."""
     hands = handler()
-    before, held_before, wanted_before = (0.0, 0.6), (False, False), (0.0, 0.6)
     fly(hands, StickInput(), frames=100, age=math.inf)
-    for stick, lever, stick_valid, lever_valid, age in inputs:
-        sticks = StickInput(1, 1, stick, lever, stick_valid=stick_valid, lever_valid=lever_valid)
-        held = (stick_valid and age <= 0.5, lever_valid and age <= 0.5)
-        wanted = (stick if held[0] else 0.0, lever if held[1] else before[1])
+    before, hand_before = (0.0, 0.6), (None, None)
+    for stick, lever, stick_valid, lever_valid, age, stream, over in inputs:
+        sticks = LIVE._replace(
+            stick=stick, lever=lever, stick_valid=stick_valid, lever_valid=lever_valid, stream=stream, overridden=over
+        )
+        hand = (
+            (stream, over & 1, stick) if stick_valid and age <= 0.5 else None,
+            (stream, over & 2, lever) if lever_valid and age <= 0.5 else None,
+        )
         command = hands.step(sticks, age=age, situation=HELICOPTER, dt=DT)
         now = (command.stick, command.lever)
         for place, fastest in ((0, 0.02), (1, 0.01)):
-            own = abs(wanted[place] - wanted_before[place]) if held[place] == held_before[place] else 0.0
+            mine, last = hand[place], hand_before[place]
+            own = abs(mine[2] - last[2]) if mine and last and mine[:2] == last[:2] else 0.0
             assert abs(now[place] - before[place]) <= own + fastest + 1e-9
-        before, held_before, wanted_before = now, held, wanted
+        before, hand_before = now, hand
 
 
 def test_settings_refuse_nonsense_and_follow_parameters():
