@@ -166,7 +166,6 @@ def test_the_table_for_people(tmp_path, capsys):
         (["--objective", "energy", "--objective", "duration", "--method", "ga"], "several objectives"),
         (["--population", "1"], "search.population"),
         (["--out", "best.txt"], "must end in .toml"),
-        (["--out", "no/such/directory/best.toml"], "does not exist"),
         (["--resume"], "no record to resume from"),
         (["none.toml"], "does not exist"),
         (["none.toml", "--like", "typical"], "cannot be combined"),
