@@ -6,11 +6,15 @@ import importlib
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.machinery import PathFinder
 from importlib.metadata import entry_points
+from importlib.util import module_from_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from rtsim.errors import InputError, closest, suggestion
+from rtsim.guests import Visit, words_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,25 +72,45 @@ def make_plugin(target: Callable[[], Any], name: str, kind: PluginKind) -> Any:
         InputError: Its class wants arguments or failed.
     """
     try:
-        return target()
+        with Visit():
+            return target()
     except (Exception, SystemExit) as error:
         raise InputError(
-            f"the {kind.noun.partition(' ')[2]} cannot be made: {type(error).__name__}: {error}",
+            f"the {kind.noun.partition(' ')[2]} cannot be made: {words_of(error)}",
             key=kind.option,
             value=name,
             mend="its class must take no arguments",
         ) from error
 
 
+def _imported(name: str, folder: str) -> ModuleType:
+    """Import a module that was named, from a folder before all others; what only happens to lie there is not.
+
+    The folder stands last on the path, for what the module itself imports from beside it.
+    """
+    if folder not in sys.path:
+        sys.path.append(folder)
+    first = name.partition(".")[0]
+    if first not in sys.modules:
+        specification = PathFinder.find_spec(first, [folder])
+        if specification is not None and specification.loader is not None:
+            module = module_from_spec(specification)
+            sys.modules[first] = module
+            try:
+                specification.loader.exec_module(module)
+            except BaseException:
+                del sys.modules[first]
+                raise
+    return importlib.import_module(name)
+
+
 def _from_module(name: str, kind: PluginKind) -> Any:
     module_name, _, class_name = name.partition(":")
     if not (module_name and class_name):
         raise InputError("is half a name", key=kind.option, value=name, mend="write MODULE:CLASS")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
     try:
-        module = importlib.import_module(module_name)
+        with Visit():
+            module = _imported(module_name, str(Path.cwd()))
     except ModuleNotFoundError as error:
         missing = error.name or module_name
         own = module_name == missing or module_name.startswith(f"{missing}.")
@@ -98,7 +122,7 @@ def _from_module(name: str, kind: PluginKind) -> Any:
         ) from error
     except (Exception, SystemExit) as error:
         raise InputError(
-            f"the module {module_name} cannot be imported: {type(error).__name__}: {error}",
+            f"the module {module_name} cannot be imported: {words_of(error)}",
             key=kind.option,
             value=name,
             mend="correct the module",
@@ -128,10 +152,11 @@ def _from_entry_point(name: str, kind: PluginKind) -> Any:
             mend=suggestion(name, choices, otherwise="choose one"),
         )
     try:
-        return offered[name].load()
+        with Visit():
+            return offered[name].load()
     except (Exception, SystemExit) as error:
         raise InputError(
-            f"the entry point cannot be loaded: {type(error).__name__}: {error}",
+            f"the entry point cannot be loaded: {words_of(error)}",
             key=kind.option,
             value=name,
             mend="reinstall the package that offers it",

@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from types import FrameType
 from typing import Annotated
 
@@ -15,6 +16,7 @@ import typer
 
 from rtsim import __version__
 from rtsim.cli.compile_text import compile_notice
+from rtsim.cli.output import machine_output
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, EXIT_TERMINATED, RtsimError, Terminated
 
 EXIT_INTERNAL_ERROR = 70
@@ -186,7 +188,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _invoke(arguments: Sequence[str] | None) -> int:
     command = typer.main.get_command(build_app())
     try:
-        with compile_notice():
+        words = sys.argv[1:] if arguments is None else arguments
+        with compile_notice(), machine_output() if "--json" in words else nullcontext():
             result = command.main(args=arguments, prog_name="rtsim", standalone_mode=False)
     except SystemExit as end:
         # The parser turns a broken pipe into exit 1, which is our code for a failed expectation.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rtsim.jsonable import to_jsonable
 
@@ -46,6 +47,39 @@ results = _LazyConsole("stdout")
 """Where tables and sentences that answer the command go when ``--json`` is not asked for."""
 
 
+_answers: list[TextIO] = []
+"""Where the JSON object goes while the rest of the process writes to stderr."""
+
+
+@contextmanager
+def machine_output() -> Iterator[None]:
+    """Keep stdout for the JSON object: whatever else is printed meanwhile, by anybody, goes to stderr."""
+    stdout = sys.stdout
+    try:
+        whole = stdout.fileno() == 1 and sys.stderr.fileno() == 2
+    except (OSError, ValueError, AttributeError):
+        whole = False  # replaced by something without a descriptor
+    if not whole:
+        sys.stdout = sys.stderr
+        _answers.append(stdout)
+        try:
+            yield
+        finally:
+            _answers.pop()
+            sys.stdout = stdout
+        return
+    stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)  # what C code and processes started from here print, too
+    _answers.append(os.fdopen(kept, "w", encoding="utf-8"))
+    try:
+        yield
+    finally:
+        stdout.flush()
+        os.dup2(kept, 1)
+        _answers.pop().close()
+
+
 def emit_json(value: object) -> None:
     """Print one JSON object as the last line of stdout.
 
@@ -54,8 +88,9 @@ def emit_json(value: object) -> None:
     """
     text = json.dumps(to_jsonable(value), allow_nan=False, ensure_ascii=False)
     # One write: a reader of a pipe sees a whole line or nothing.
-    sys.stdout.write(text + "\n")
-    sys.stdout.flush()
+    stream = _answers[-1] if _answers else sys.stdout
+    stream.write(text + "\n")
+    stream.flush()
 
 
 @contextmanager

@@ -20,12 +20,15 @@ def register(app: typer.Typer) -> None:
 def replay_command(
     log: Annotated[Path, typer.Argument(help="A flight log, as written by rtsim fly --log.")],
     *,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Run the code of protection laws that the log names (MODULE:CLASS).")
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs."""
     from scenarios.flight.replay import replay_log
 
-    result = replay_log(log)
+    result = replay_log(log, trust=trust)
     for change in result.changed_versions:
         say(f"Not the same as when it was recorded: {change}.")
     if not result.complete:

@@ -193,6 +193,7 @@ def _print(cases: list[Case]) -> None:
     results.print(table)
     for case in cases:
         words = [case.error] if case.error else [f"{item.name}: {item.sentence}" for item in case.failures]
+        words += [case.note] if case.note else []
         for word in words:
             # Whole lines: whoever reads a pipe looks for them, and terminals wrap by themselves.
             results.print(f"{case.name}: {word}", markup=False, soft_wrap=True)

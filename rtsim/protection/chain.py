@@ -15,14 +15,15 @@ from typing import Literal
 from rtsim.aircraft.profile import AircraftProfile
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.errors import InputError
+from rtsim.guests import words_of
 from rtsim.protection.guard import Failure, GuardedAnswer, guarded_call
 from rtsim.protection.laws import CHANNELS, LawSpec
 from rtsim.protection.limits import LIMIT_KINDS, frames_per_decision
 
 BATCH_LIMIT = 1.0
-"""Wall time of one call after which a law is ended in a batch [s]."""
+"""CPU time of one call after which a law is ended in a batch [s]."""
 LIVE_LIMIT = 0.25
-"""The same in a live flight, where the loop waits meanwhile [s]."""
+"""Time on the clock after which it is in a live flight, where the loop waits meanwhile [s]."""
 OTHER_REASON = float(len(LIMIT_KINDS) + 1)
 """Recorded reason of an intervention whose limit is none of ``LIMIT_KINDS``."""
 RANGES = ((-1.0, 1.0), (0.0, 1.0), (-math.inf, math.inf))
@@ -116,7 +117,7 @@ class LawChain:
         self.events: list[LawEvent] = []
         """What happened besides limiting."""
         self.slow_calls = 0
-        """Calls so far that took longer than the time between two of them."""
+        """Calls so far that took longer than the time between two of them: live on the clock, else in CPU time."""
         self.interventions: tuple[ChainedIntervention, ...] = ()
         """What the laws say they did in the last decision."""
         self.live, self.on_event, self.remember = live, on_event, remember
@@ -169,7 +170,7 @@ class LawChain:
                 copies.append(copy.deepcopy(law))
             except Exception as error:
                 raise InputError(
-                    f"the law cannot be copied: {type(error).__name__}: {error}",
+                    f"the law cannot be copied: {words_of(error)}",
                     key="--protection",
                     value=spec.name,
                     mend="keep plain values, arrays and objects that copy.deepcopy can copy",
@@ -248,7 +249,9 @@ class LawChain:
                 continue
             fresh = spec.make()
             for number, call in enumerate(self._calls[place]):
-                again = guarded_call(fresh, call.sensors, call.command, call.margins, dt=self.period, limit=BATCH_LIMIT)
+                again = guarded_call(
+                    fresh, call.sensors, call.command, call.margins, dt=self.period, limit=BATCH_LIMIT, live=False
+                )
                 if again.command != call.answer:
                     text = (
                         f"the law {spec.name} keeps state outside its instance: asked again with the same values, its "
@@ -274,7 +277,7 @@ class LawChain:
             self._tell(LawEvent(frame, name, "skipped", text, False))
             return None
         limit = LIVE_LIMIT if self.live else BATCH_LIMIT
-        answer = guarded_call(law, sensors, command, margins, dt=self.period, limit=limit)
+        answer = guarded_call(law, sensors, command, margins, dt=self.period, limit=limit, live=self.live)
         if answer.failure is not None:
             self._laws[place] = None
             self._fail(frame, name, answer.failure, answer.text)

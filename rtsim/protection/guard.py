@@ -16,6 +16,7 @@ from typing import Any, Literal, Self, TypeVar, cast
 
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.errors import Terminated
+from rtsim.guests import Visit, shown, words_of
 from rtsim.protection.laws import CHANNELS
 
 TraceFunction = Callable[[FrameType, str, Any], Any]
@@ -26,6 +27,8 @@ _FIELDS: dict[type, Callable[[Any], tuple[Any, ...]]] = {
 }
 _set_handler: Callable[[int, Any], Any] = getattr(signal.signal, "__wrapped__", signal.signal)
 """``signal.signal`` without its look-up of enumerations, which takes longer than most laws."""
+HANGS = 60.0
+"""A call that uses no CPU time and does not come back for as long hangs [s]."""
 KINDS = ("warn", "limit", "reverse", "blend", "clip")
 """How a law may say it acted."""
 Failure = Literal["raised", "not_finite", "wrong_answer", "interrupted"]
@@ -48,24 +51,29 @@ class GuardedAnswer:
     text: str
     """The failure for people."""
     duration: float
-    """Wall time of the call [s]."""
+    """Time of the call: on the clock where a clock waits for it, else CPU time of the thread [s]."""
 
 
 class CallLimit:
     """Interrupts whatever runs inside the ``with`` block after a time, where the system can: main thread, POSIX.
+
+    Live, the time is that of the clock, since the loop waits. Otherwise it is CPU time, so that what becomes of a law
+    does not depend on what else the machine does; who uses none is interrupted after ``HANGS`` on the clock.
 
     Code that swallows the interruption (``except:`` inside a loop) is interrupted again every 0.1 s, each time one
     more line after it was swallowed, until that hits a line outside its ``try``. Only a call into C that never comes
     back cannot be ended.
     """
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self, seconds: float, *, live: bool) -> None:
         """Set the limit.
 
         Args:
-            seconds: Wall time the block may take [s].
+            seconds: Time the block may take [s].
+            live: On the clock, not in CPU time.
         """
-        self._seconds = seconds
+        self._seconds, self._live = seconds, live
+        self._cpu = 0.0
         self._armed = False
         self._previous: object = None
         self._rest = (0.0, 0.0)
@@ -77,6 +85,7 @@ class CallLimit:
         self._armed = hasattr(signal, "setitimer") and threading.current_thread() is threading.main_thread()
         if self._armed:
             self._began, self._interruptions, self._trace = time.monotonic(), 0, sys.gettrace()
+            self._cpu = time.thread_time()
             self._previous = _set_handler(signal.SIGALRM, self._interrupt)
             # Repeats, for a law that catches everything.
             self._rest = signal.setitimer(signal.ITIMER_REAL, self._seconds, 0.1)
@@ -99,6 +108,9 @@ class CallLimit:
         leaving = CallLimit.__exit__.__code__
         if frame is not None and frame.f_code is leaving:
             return
+        used = time.monotonic() - self._began, time.thread_time() - self._cpu
+        if not self._live and used[1] < self._seconds and used[0] < HANGS:
+            return
         self._interruptions += 1
         lines = self._interruptions
 
@@ -120,7 +132,7 @@ class CallLimit:
 
 
 def guarded_call(
-    law: ProtectionLaw, sensors: Sensors, command: Command, margins: Margins, *, dt: float, limit: float
+    law: ProtectionLaw, sensors: Sensors, command: Command, margins: Margins, *, dt: float, limit: float, live: bool
 ) -> GuardedAnswer:
     """Ask a law, whatever it does.
 
@@ -129,23 +141,26 @@ def guarded_call(
         command: The command it may limit.
         margins: Distances to the corridor.
         dt: Time since its last call [s].
-        limit: Wall time after which the call is interrupted [s].
+        limit: Time after which the call is interrupted [s].
+        live: The clock waits for the law: its time is that on the clock, else CPU time.
     """
-    began = time.perf_counter()
+    clock = time.perf_counter if live else time.thread_time
+    began = clock()
     failure: Failure | None = None
     text = ""
     answer: object = None
     given = (_copy(sensors), _copy(command), _copy(margins))
     try:
-        with CallLimit(limit):
+        with Visit(), CallLimit(limit, live=live):
             answer = law.step(*given, dt)
     except LawInterruptedError:
-        failure, text = "interrupted", f"took more than {limit:g} s in one call"
+        spent = f"took more than {limit:g} s" if live else f"used more than {limit:g} s of CPU time, or hung,"
+        failure, text = "interrupted", f"{spent} in one call"
     except (KeyboardInterrupt, Terminated):
         raise  # from whoever runs rtsim
     except BaseException as error:  # noqa: BLE001 - a user's own code may raise anything
-        failure, text = "raised", f"raised {_words(error)}"
-    duration = time.perf_counter() - began
+        failure, text = "raised", f"raised {words_of(error)}"
+    duration = clock() - began
     if failure is None and duration > limit:
         # Where no alarm can be set the call is judged when it comes back.
         failure, text = "interrupted", f"took {duration:.2f} s in one call, more than {limit:g} s"
@@ -168,9 +183,9 @@ def _checked(answer: object, duration: float) -> GuardedAnswer:
         command = Command(float(limited.stick), float(limited.lever), float(limited.nacelle_rate))
         listed = tuple(interventions)
     except (TypeError, ValueError, AttributeError):
-        shown = _shown(answer)
-        shown = shown if len(shown) <= 80 else f"{shown[:77]}..."
-        text = f"answered {shown} where (Command, list of Intervention) is asked for"
+        said = shown(answer)
+        said = said if len(said) <= 80 else f"{said[:77]}..."
+        text = f"answered {said} where (Command, list of Intervention) is asked for"
         return GuardedAnswer(None, (), "wrong_answer", text, duration)
     for item in listed:
         odd = _odd_intervention(item)
@@ -184,31 +199,14 @@ def _checked(answer: object, duration: float) -> GuardedAnswer:
 def _odd_intervention(item: Any) -> str:
     """What is wrong with what should be an intervention; empty where nothing is."""
     if not isinstance(item, Intervention):
-        return f"something else: {_shown(item)}"
+        return f"something else: {shown(item)}"
     if not isinstance(item.limit, str):
-        return f"limit={_shown(item.limit)}, which is no name"
+        return f"limit={shown(item.limit)}, which is no name"
     for name, allowed in (("channel", CHANNELS), ("kind", KINDS)):
         value: object = getattr(item, name)
         if not isinstance(value, str) or value not in allowed:
-            return f"{name}={_shown(value)} where one of {', '.join(allowed)} is asked for"
+            return f"{name}={shown(value)} where one of {', '.join(allowed)} is asked for"
     for name in ("before", "after", "margin", "time_to_limit"):
         if not isinstance(getattr(item, name), Real):
-            return f"{name}={_shown(getattr(item, name))}, which is no number"
+            return f"{name}={shown(getattr(item, name))}, which is no number"
     return ""
-
-
-def _words(error: BaseException) -> str:
-    """An error for people, whatever its own ``str`` does."""
-    try:
-        said = str(error)
-    except Exception:  # noqa: BLE001 - a user's own code may raise anything
-        said = ""
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
-
-
-def _shown(value: object) -> str:
-    """A value for people, whatever its own ``repr`` does."""
-    try:
-        return repr(value)
-    except Exception:  # noqa: BLE001 - a user's own code may raise anything
-        return f"a {type(value).__name__}"

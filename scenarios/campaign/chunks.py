@@ -178,7 +178,7 @@ def law_chain(name: str, folder: str, boundary: CorridorName = "flight", databas
     import sys
 
     if folder and folder not in sys.path:
-        sys.path.insert(0, folder)
+        sys.path.append(folder)
     return load_laws(name, boundary=boundary, database=database)
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 TRIAL_CORRIDOR: CorridorName = "flight"
 """Corridor of trials that name none: laws keep to it and flights are judged by it, with a law and without."""
 SLOW_CALLS = 10
-"""Calls of a law in one flight that last longer than its period and count as a failure; fewer are the machine's."""
+"""Calls of a law in one flight that last longer than its period and are told; fewer are the machine's."""
 BUFFERED = ("reverse_margin", "pass_margin", "blend_begin", "blend_full")
 """Margins of the built-in laws that a buffer is added to."""
 
@@ -57,6 +57,8 @@ class TrialFlight:
     """Frame history; a view that the next flight of the same bench overwrites unless it was asked to be kept."""
     law_problems: tuple[str, ...] = ()
     """What went wrong in laws written in Python, as sentences."""
+    late: str = ""
+    """Laws in Python that this machine would be too slow for in real time, as a sentence; nothing is judged by it."""
 
     @property
     def history_sha256(self) -> str:
@@ -116,7 +118,8 @@ class Bench:
             rows = _fly_by_hand(simulation, pilot, self._rows[:frames])
         if chain is not None and repeat:
             chain.unrepeatable()
-        problems = () if chain is None else (*(event.text for event in chain.events), *_late(chain, law))
+        problems = () if chain is None else tuple(event.text for event in chain.events)
+        late = "" if chain is None else _late(chain, law)
         yielded = bool(simulation.flying.state.script[S_YIELDED])
         numbers = measured(
             rows,
@@ -126,7 +129,7 @@ class Bench:
             ended=simulation.finished,
             yielded=yielded,
         )
-        return TrialFlight(TrialMetrics(numbers), simulation.end_reason, rows.copy() if keep else rows, problems)
+        return TrialFlight(TrialMetrics(numbers), simulation.end_reason, rows.copy() if keep else rows, problems, late)
 
 
 def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
@@ -138,13 +141,13 @@ def _setup(plan: FlightPlan, law: str, *, external: bool) -> FlightSetup:
     )
 
 
-def _late(chain: LawChain, law: str | Sequence[LawSpec]) -> tuple[str, ...]:
-    """Laws that would be late in real time, as a sentence; it changes nothing of the flight."""
+def _late(chain: LawChain, law: str | Sequence[LawSpec]) -> str:
+    """Laws that would be late in real time, as a sentence; it changes nothing, since the next machine is another."""
     if chain.slow_calls < SLOW_CALLS:
-        return ()
+        return ""
     names = law if isinstance(law, str) else ", ".join(spec.name for spec in law)
-    late = f"took longer than its period of {1000.0 * chain.period:.0f} ms in {chain.slow_calls} calls"
-    return (f"the law {names} {late}; in real time it would be late",)
+    late = f"used more CPU time than its period of {1000.0 * chain.period:.0f} ms in {chain.slow_calls} calls"
+    return f"the law {names} {late}; in real time on this machine it would be late"
 
 
 def _with_buffer(tables: SimulationTables, buffer: float) -> SimulationTables:

@@ -118,7 +118,8 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
         found += _point_contradictions(content.programme, file)
     found += disturbance_problems(content.air, content.faults, file)
     found += automatic_problems(content.automatic, given(content.flight).get("nacelle", ""), file)
-    found += trial_problems(content.pulses, content.trial, has_events=bool(content.events), file=file)
+    events, flight = bool(content.events), given(content.flight)
+    found += trial_problems(content.pulses, content.trial, has_events=events, flight=flight, file=file)
     for number, clause in enumerate(content.expect):
         from rtsim.measures.metrics import METRIC_NAMES  # loads compiled code
 

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from rtsim.command import Command, NacelleLaw, Sensors
 from rtsim.errors import InputError
+from rtsim.guests import Visit, words_of
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.programme import Programme
 from rtsim.strict import Strict
@@ -183,9 +184,10 @@ class NacelleLawGuard:
         if self._law is None:
             return command, ""
         try:
-            rate = float(self._law.step(sensors, command, dt))
+            with Visit():
+                rate = float(self._law.step(sensors, command, dt))
         except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything; the flight must go on
-            failure = f"the nacelle law raised {type(error).__name__}: {error}"
+            failure = f"the nacelle law raised {words_of(error)}"
         else:
             if math.isfinite(rate):
                 return dataclasses.replace(command, nacelle_rate=rate), ""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from rtsim.errors import InputError, suggestion
 from rtsim.loop.script import Pulse
@@ -36,7 +36,12 @@ class Trial:
 
 
 def trial_problems(
-    pulses: Sequence[PulseTable], trial: TrialTable | None, *, has_events: bool, file: str
+    pulses: Sequence[PulseTable],
+    trial: TrialTable | None,
+    *,
+    has_events: bool,
+    flight: Mapping[str, Any],
+    file: str,
 ) -> list[InputError]:
     """Mistakes in ``[[pulses]]`` and ``[trial]`` that involve more than one key.
 
@@ -44,7 +49,13 @@ def trial_problems(
         pulses: The script.
         trial: The test, or None.
         has_events: Whether the scenario hands the controls over.
+        flight: The options that it gives, by field.
     """
+    found = _pulse_problems(pulses, file)
+    return found if trial is None else found + _test_problems(trial, has_events=has_events, flight=flight, file=file)
+
+
+def _pulse_problems(pulses: Sequence[PulseTable], file: str) -> list[InputError]:
     found = []
     for number, pulse in enumerate(pulses):
         largest = {"stick": LARGEST_STICK, "lever": LARGEST_LEVER}.get(pulse.channel, 12.0)
@@ -61,10 +72,20 @@ def trial_problems(
         if pulse.replaces and pulse.channel == "switch":
             key = f"pulses[{number}].replaces"
             found.append(InputError("has no meaning for the switch", file=file, key=key, mend="delete it"))
-    if trial is None:
-        return found
+    return found
+
+
+def _test_problems(trial: TrialTable, *, has_events: bool, flight: Mapping[str, Any], file: str) -> list[InputError]:
+    found = []
     if has_events:
         found.append(InputError("cannot be flown as a trial", file=file, key="events", mend="delete events or [trial]"))
+    for key in ("pilot", "nacelle"):
+        if ":" in flight.get(key, ""):
+            mend = f"delete [trial], or flight.{key}: trials are flown by the MOCM and by built-in nacelle control"
+            value = flight[key]
+            found.append(
+                InputError("cannot be flown as a trial", file=file, key=f"flight.{key}", value=value, mend=mend)
+            )
     if trial.kind in {"misuse", "failure", "unprotectable"} and not trial.off_leaves:
         found.append(
             InputError(

@@ -14,8 +14,10 @@ from rtsim.arrays import FloatArray
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN, SIGNAL_NAMES, history_sha256
+from rtsim.guests import readable
 from rtsim.loop.options import declared
 from rtsim.loop.simulation import MODES, Simulation
+from rtsim.protection.tables import LAW_NAMES
 from scenarios.files.disturbances import DISTURBANCE_KINDS, disturbance_from_event
 from scenarios.flight.flight_setup import setup_from_json, versions
 from telemetry.log.format import LogEvent
@@ -63,11 +65,12 @@ class ReplayResult:
     """Versions and databases that differ from those of the recording, in words."""
 
 
-def replay_log(path: str | Path) -> ReplayResult:
+def replay_log(path: str | Path, *, trust: bool = False) -> ReplayResult:
     """Fly a log again.
 
     Args:
         path: The flight log.
+        trust: Import and run the code of laws that the log names (``MODULE:CLASS``).
 
     Raises:
         InputError: If it is no log, has no frames, or was written with other signals.
@@ -76,7 +79,15 @@ def replay_log(path: str | Path) -> ReplayResult:
     recorded = log.history
     if not len(recorded):
         raise InputError("holds no frames", file=str(path), mend="record a flight of at least a second")
-    simulation = Simulation(_setup(log))
+    setup = _setup(log)
+    named = [name for name in setup.options.protection.split(",") if name.strip() not in LAW_NAMES]
+    if named and not trust:
+        raise InputError(
+            f"the log names code that would be run: {', '.join(readable(name) for name in named)}",
+            file=str(log.path),
+            mend="look at it first; then replay with --trust",
+        )
+    simulation = Simulation(setup)
     replayed = fly_recording(simulation, recorded, log.events)
     recorded_hash = history_sha256([recorded])
     stated_hash = None if log.summary is None else log.summary.get("history_sha256")

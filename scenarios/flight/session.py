@@ -15,6 +15,7 @@ from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults.fault import fault_events
 from rtsim.frame import SIGNAL_COUNT
+from rtsim.guests import Visit, words_of
 from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.protection.chain import LawEvent
@@ -327,10 +328,11 @@ class FlightSession:
         """The plug-in's command; where it fails, the flight ends with the controls held for one last frame."""
         simulation = self.simulation
         try:
-            answer = pilot.step(simulation.sensors(), simulation.reference(), simulation.dt)
+            with Visit():
+                answer = pilot.step(simulation.sensors(), simulation.reference(), simulation.dt)
             command = Command(float(answer.stick), float(answer.lever), float(answer.nacelle_rate))
         except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything; end cleanly
-            problem = f"raised {type(error).__name__}: {error}"
+            problem = f"raised {words_of(error)}"
         else:
             if math.isfinite(command.stick + command.lever + command.nacelle_rate):
                 return command

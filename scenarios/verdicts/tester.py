@@ -87,6 +87,8 @@ class Case:
     """Time it took [s]."""
     error: str = ""
     """What kept it from being flown or judged; empty where nothing did."""
+    note: str = ""
+    """What is worth knowing of the law and depends on the machine, so that nothing is judged by it."""
 
     @property
     def name(self) -> str:
@@ -118,6 +120,7 @@ class Case:
             "law": self.law,
             "verdict": self.verdict,
             "error": self.error,
+            "note": self.note,
             "seed": self.scenario.options.seed,
             "plant": self.scenario.options.plant,
             "database": self.scenario.options.database,
@@ -200,6 +203,7 @@ class Tester:
             flight=FlightHistory(flown.rows, flown.end_reason),
             off=FlightHistory(off.rows, off.end_reason),
             wall_s=time.perf_counter() - begin,
+            note=flown.late,
         )
 
     def _flight_case(self, scenario: Scenario) -> Case:

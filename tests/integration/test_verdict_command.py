@@ -52,12 +52,6 @@ class NotANumber(Good):
     def step(self, sensors, command, margins, dt):
         return type(command)(float("nan"), command.lever, command.nacelle_rate), []
 
-class Sleeps(Good):
-    def step(self, sensors, command, margins, dt):
-        if 1.0 < sensors.time < 1.3:
-            time.sleep(0.05)
-        return command, []
-
 class Stubborn(Good):
     def step(self, sensors, command, margins, dt):
         while sensors.time > 1.0:
@@ -147,9 +141,8 @@ def test_a_failure_is_told_and_can_be_replayed(folder):
     [
         ("Raises", "no such thing"),
         ("NotANumber", "not finite"),
-        ("Sleeps", "took longer than its period"),
         ("Global", "keeps state outside"),
-        ("Stubborn", "took more than 1 s in one call"),
+        ("Stubborn", "used more than 1 s of CPU time"),
         ("Odd", "raised GeneratorExit: no Exception"),
         ("Changes", "changed what it was given"),
     ],
