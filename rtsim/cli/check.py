@@ -9,7 +9,8 @@ import typer
 
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, suggestion
-from rtsim.toml_file import read_text, read_toml
+from rtsim.outside import read_text
+from rtsim.toml_file import read_toml
 
 if TYPE_CHECKING:
     from rtsim.lpv.database import Database
