@@ -108,17 +108,18 @@ def _refuse_large_numbers(value: Any, key: str, file: str) -> None:
         )
 
 
-def read_toml(path: str | Path, *, noun: str) -> dict[str, Any]:
+def read_toml(path: str | Path, *, noun: str, may_be_empty: bool = False) -> dict[str, Any]:
     """The tables of a file that somebody gave.
 
     Args:
         path: The file.
         noun: What it should be, without article.
+        may_be_empty: Whether an empty file means something.
 
     Raises:
         InputError: It cannot be read, or is not valid TOML.
     """
-    return parse_toml(read_text(path, noun=noun), file=str(path))
+    return parse_toml(read_text(path, noun=noun, may_be_empty=may_be_empty), file=str(path))
 
 
 def _shipped(folder: str) -> Traversable:

@@ -152,7 +152,7 @@ def test_missing_file(tmp_path, name):
 @pytest.mark.parametrize("name", ["noise.nc", "noise.mat"])
 def test_file_of_another_kind(tmp_path, name):
     (tmp_path / name).write_bytes(b"this is no database, but long enough to have a header " * 20)
-    with pytest.raises(InputError, match="is damaged, or no .* database"):
+    with pytest.raises(InputError, match=r"is damaged, or no .* database"):
         load_database(tmp_path / name)
 
 
