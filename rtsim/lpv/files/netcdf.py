@@ -7,6 +7,8 @@ A file is written beside its target and renamed, so a reader never meets half of
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -17,6 +19,7 @@ import numpy.typing as npt
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
 from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.files import netcdf_trial
 from rtsim.lpv.files.assemble import KINDS, LARGEST_CONTENT, LARGEST_FILE, assemble_database, real_array
 from rtsim.lpv.sanity import AXIS_UNITS
 from rtsim.outside import regular_file, understanding
@@ -73,10 +76,22 @@ def read_database(path: str | Path | None = None) -> Database:
     import netCDF4
 
     mend = "write it anew (docs/lpv.md), or restore it"
+    if file != SHIPPED:
+        _try(file, mend)
     with understanding("NetCDF database", file=file, mend=mend), netCDF4.Dataset(str(file), "r") as dataset:
         dataset.set_auto_mask(False)
         _measure(dataset)
         return _read(dataset, str(file))
+
+
+def _try(file: Path, mend: str) -> None:
+    """Have another process read a file first: given a damaged one the library may loop for ever, or crash."""
+    command = [sys.executable, "-P", str(Path(netcdf_trial.__file__)), str(file.resolve())]
+    ended = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    if ended.returncode:
+        lines = ended.stderr.decode(errors="replace").split("\n") if ended.returncode == 1 else []
+        with understanding("NetCDF database", file=file, mend=mend):
+            raise ValueError(next((line for line in reversed(lines) if line), "reading it does not end, or crashes"))
 
 
 def _measure(dataset: Any) -> None:
