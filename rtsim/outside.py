@@ -31,6 +31,21 @@ _MARKS = {b"\xff\xfe\x00\x00": "UTF-32", b"\x00\x00\xfe\xff": "UTF-32", b"\xff\x
 _LONGEST_REASON = 200
 
 
+def named(path: str | os.PathLike[str]) -> Path:
+    """The path that somebody gave.
+
+    Args:
+        path: The path.
+
+    Raises:
+        InputError: It is no path.
+    """
+    try:
+        return Path(path)
+    except TypeError:
+        raise InputError("is no path", key="path", value=path, mend="give the name of a file") from None
+
+
 def regular_file(path: str | Path, *, noun: str, largest: int, missing: str = "check the path") -> Path:
     """A file that a library may open: there, regular, not empty, not too large, readable.
 
@@ -43,7 +58,7 @@ def regular_file(path: str | Path, *, noun: str, largest: int, missing: str = "c
     Raises:
         InputError: It is not.
     """
-    file, shown = Path(path), str(path)
+    file, shown = named(path), str(path)
     with opening(file, missing):
         status = file.stat()
         _refuse_by_kind(status, shown, noun, largest)
@@ -67,13 +82,13 @@ def read_bytes(path: str | Path, *, noun: str, largest: int, missing: str = "che
     Raises:
         InputError: It is not there, no file, too large, does not end, or must not be read.
     """
-    file, shown = Path(path), str(path)
+    file, shown = named(path), str(path)
     with opening(file, missing):
         status = file.stat()
         _refuse_by_kind(status, shown, noun, largest)
         if stat.S_ISREG(status.st_mode):
             with file.open("rb") as stream:
-                data = stream.read(largest + 1)
+                data = stream.read(status.st_size + 1) or stream.read(LARGEST_TEXT)
         else:
             data = _streamed(file, shown, noun, largest)
     if len(data) > largest:

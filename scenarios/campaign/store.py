@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from rtsim.errors import InputError, OutputError
-from rtsim.outside import read_arrays, read_text, understanding
+from rtsim.outside import LARGEST_TEXT, read_arrays, read_bytes, understanding
 from rtsim.whole_file import whole_file, write_whole
 from scenarios.campaign.chunks import Chunk, ChunkResult
 
@@ -112,9 +112,9 @@ class Store:
             if not any(self._chunks.glob("*.npz")):
                 return None
             raise InputError("is missing beside pieces of a campaign", file=str(path), mend=mend)
-        text = read_text(path, noun="campaign's identity", missing=mend)
+        data = read_bytes(path, noun="campaign's identity", largest=LARGEST_TEXT, missing=mend)
         with understanding("campaign's identity", file=path, mend=mend):
-            return TypeAdapter(dict[str, Any]).validate_python(json.loads(text))
+            return TypeAdapter(dict[str, Any]).validate_python(json.loads(data.decode("utf-8-sig")))
 
     def _clear(self) -> None:
         for path in self._chunks.glob("*.npz"):

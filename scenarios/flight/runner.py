@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rtsim.arguments import instance
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
 from rtsim.frame import history_sha256
@@ -100,7 +101,10 @@ def fly(
     """
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
+    if outputs is not None:
+        instance(outputs, FlightOutputs, "outputs", "give FlightOutputs(log=...)")
     if overrides is not None:
+        instance(overrides, Overrides, "overrides", "give Overrides(duration=...)")
         scenario = with_overrides(scenario, overrides)
     for problem in preflight_problems(scenario):
         raise problem

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_NAMES, history_sha256
-from rtsim.outside import opening, read_text, regular_file, understanding
+from rtsim.outside import named, opening, read_text, regular_file, understanding
 from telemetry.log.format import (
     EVENTS_FILE,
     LOG_VERSION,
@@ -122,7 +122,7 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
     Raises:
         InputError: There is no log, or it is none of rtsim, or one of its files is damaged.
     """
-    directory = Path(path)
+    directory = named(path)
     parts = _parts(directory)
     header, *others = parts
     entries, names, _ = _read_part(header)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import resource
 import sys
 
-CPU_SECONDS = 10
+CPU_SECONDS = 5
 """A file of half a gigabyte takes three."""
 MEMORY_BYTES = 8_000_000_000
 """Address space, most of which is the libraries'."""
@@ -35,7 +35,11 @@ def read_everything(path: str) -> None:
 
 
 if __name__ == "__main__":
-    for limit, value in ((resource.RLIMIT_CPU, CPU_SECONDS), (resource.RLIMIT_AS, MEMORY_BYTES), (resource.RLIMIT_CORE, 0)):
+    for limit, value in (
+        (resource.RLIMIT_CPU, CPU_SECONDS),
+        (resource.RLIMIT_AS, MEMORY_BYTES),
+        (resource.RLIMIT_CORE, 0),
+    ):
         hard = resource.getrlimit(limit)[1]  # no process may raise its own
         allowed = value if hard == resource.RLIM_INFINITY else min(value, hard)
         resource.setrlimit(limit, (allowed, hard))
