@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -31,6 +32,21 @@ def number(value: Any, key: str, unit: str = "") -> float:
     if not math.isfinite(found):
         raise InputError("is not a finite number", key=key, value=value, mend=f"give one{unit and ' in '}{unit}")
     return found
+
+
+def whole_number(value: Any, key: str) -> int:
+    """A whole number from 0 on.
+
+    Args:
+        value: What was given.
+        key: The argument.
+
+    Raises:
+        InputError: It is none.
+    """
+    if not hasattr(value, "__index__") or value < 0:
+        raise InputError("is no whole number from 0 on", key=key, value=value, mend="give one")
+    return operator.index(value)
 
 
 def vector(value: Any, key: str, size: int) -> FloatArray:
