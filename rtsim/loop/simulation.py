@@ -11,7 +11,7 @@ import numpy as np
 
 from rtsim.aids.design import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
-from rtsim.arguments import instance
+from rtsim.arguments import instance, whole_number
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import add_gust, set_turbulence
 from rtsim.atmosphere.specification import Gust, Turbulence
@@ -216,10 +216,7 @@ class Simulation:
         Returns:
             The rows, shape (frames flown, SIGNAL_COUNT).
         """
-        if not isinstance(frames, int | np.integer) or frames < 0:
-            raise InputError(
-                "is no number of frames", key="frames", value=frames, mend="give a whole number, 0 or more"
-            )
+        frames = whole_number(frames, "frames")
         rows = np.empty((frames, SIGNAL_COUNT)) if rows is None else rows
         if rows.ndim != 2 or len(rows) < frames or rows.shape[1] != SIGNAL_COUNT or not rows.flags.c_contiguous:
             allowed = f"at least {frames} x {SIGNAL_COUNT}, contiguous"

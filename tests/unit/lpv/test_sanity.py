@@ -80,7 +80,5 @@ def test_arrays_of_matlab_files_are_real_and_whole(toy_database, tmp_path, name,
 @pytest.mark.parametrize("content", [b"", b"hello\n", b"MATLAB 5.0 MAT-file" + b" " * 200, b"\0" * 200])
 def test_what_is_no_matlab_file_at_all(tmp_path, content):
     (tmp_path / "a.mat").write_bytes(content)
-    with pytest.raises(
-        InputError, match=r"a\.mat: is (empty|damaged, or no MATLAB database|.*the array is missing)|missing"
-    ):
+    with pytest.raises(InputError, match=r"a\.mat: .*(is empty|is damaged, or no MATLAB database|is missing)"):
         load_database(tmp_path / "a.mat")
