@@ -271,13 +271,13 @@ class LpvAircraft:
 
     def _require_inside(self, airspeed: float, nacelle: float) -> None:
         d = self.database
-        degrees = f"angles are in radians: write nacelle=deg({nacelle}) with rtsim.units.deg"
+        airspeed, nacelle = number(airspeed, "airspeed", "m/s"), number(nacelle, "nacelle", "rad")
+        degrees = f"angles are in radians: write nacelle=deg({nacelle:g}) with rtsim.units.deg"
         nonlinear = "choose a value in this range, or solve the nonlinear model there (--nonlinear)"
         for name, value, axis, shown, unit in (
             ("airspeed", airspeed, d.airspeed, to_kt, "kn"),
             ("nacelle", nacelle, d.nacelle, to_deg, "deg"),
         ):
-            number(value, name, "m/s" if name == "airspeed" else "rad")
             slack = 1e-9 * (axis[-1] - axis[0])
             if not axis[0] - slack <= value <= axis[-1] + slack:
                 raise InputError(
