@@ -247,12 +247,12 @@ def profile_problems(database: Database) -> list[InputError]:
     reads += [
         functools.partial(load_pilot_tables, database, name) for name in get_args(OuterLoop) if name in database.pilot
     ]
-    found: dict[str, InputError] = {}  # a part is read by several, who stumble over the same number
+    found: dict[tuple[str, str], InputError] = {}  # a part is read by several, who stumble over the same number
     for read in reads:
         try:
             read()
         except InputError as error:
-            found.setdefault(str(error), error)
+            found.setdefault((error.problem, str(error) if error.value is None else repr(error.value)), error)
     return list(found.values())
 
 
