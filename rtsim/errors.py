@@ -9,6 +9,8 @@ EXIT_BAD_INPUT = 2
 EXIT_OVERRUN = 3
 EXIT_OUTPUT_FAILED = 4
 EXIT_TERMINATED = 143
+LONGEST_VALUE = 300
+"""Of a longer value only the beginning is shown [characters]."""
 
 
 class Terminated(SystemExit):
@@ -50,15 +52,29 @@ class InputError(RtsimError):
         """
         self.problem, self.file, self.key = problem, file, key
         self.value, self.allowed, self.mend = value, allowed, mend
-        where = ": ".join(part for part in (file, key) if part)
+        where = ": ".join(_printable(part) for part in (file, key) if part)
         text = f"{where}: {problem}" if where else problem
         if value is not None:
-            text += f" (got {value!r})"
+            text += f" (got {_shown(value)})"
         if allowed:
             text += f"; allowed: {allowed}"
         if mend:
             text += f"; {mend}"
         super().__init__(text if text.endswith("?") else text + ".")
+
+
+def _printable(text: str) -> str:
+    """Without what would move a terminal's cursor or end the line."""
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in text)
+
+
+def _shown(value: object) -> str:
+    """A value in one line that can be read."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits, a list in a list in a list
+        return f"a {type(value).__name__}"
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
 
 
 class OutputError(RtsimError):

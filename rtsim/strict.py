@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterable
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin
+from collections.abc import Callable, Iterable
+from typing import Any, Generic, Literal, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
@@ -53,6 +53,84 @@ def explain(error: ValidationError, model: type[BaseModel], file: str | None) ->
         key = dotted(location)
         found.setdefault(key, _explain_one(item, location, key, model, file))
     return list(found.values())
+
+
+class Examined(Generic[Table]):
+    """A file's content as far as it can be understood, and every mistake found so far."""
+
+    def __init__(self, model: type[Table], data: Any, *, file: str | None) -> None:
+        """Check every key and value.
+
+        Args:
+            model: What the file may hold.
+            data: What it holds.
+        """
+        self.content: Table
+        """The content; what is wrong in it has its default, or is None."""
+        self.problems: list[InputError] = []
+        """What was found, in the order of the questions."""
+        try:
+            self.content = model.model_validate(data)
+        except ValidationError as error:
+            self.problems = explain(error, model, file)
+            wrong = {tuple(p for p in item["loc"] if not _is_union_tag(p)) for item in error.errors()}
+            self.content = _lenient(model, data if isinstance(data, dict) else {}, (), wrong)
+
+    def ask(self, *checks: Callable[[Table], list[InputError]]) -> None:
+        """Look for more mistakes: where there are some already, only for those that do not follow from them.
+
+        Args:
+            checks: Each finds mistakes in the content.
+        """
+        known = [problem.key or "" for problem in self.problems]
+        for check in checks:
+            try:
+                found = check(self.content)
+            except Exception:  # of what is wrong already, a check may stumble over the pieces
+                if not known:
+                    raise
+                continue
+            self.problems += [item for item in found if not any(_related(item.key or "", key) for key in known)]
+
+
+def _related(one: str, other: str) -> bool:
+    """Whether two keys are the same, or one stands within the other."""
+    short, long = sorted((one, other), key=len)
+    return bool(short) and long.startswith(short) and long[len(short) :][:1] in {"", ".", "["}
+
+
+def _lenient(
+    model: type[Table], data: dict[str, Any], place: tuple[str | int, ...], wrong: set[tuple[str | int, ...]]
+) -> Table:
+    """A table from whatever of it is right."""
+    values = {}
+    for name, field in model.model_fields.items():
+        missing = None if field.is_required() else field.get_default(call_default_factory=True)
+        here = (*place, name)
+        values[name] = _lenient_value(field.annotation, data[name], here, wrong) if name in data else missing
+        if values[name] is None:
+            values[name] = missing
+    return model.model_construct(**values)
+
+
+def _lenient_value(annotation: Any, value: Any, place: tuple[str | int, ...], wrong: set[tuple[str | int, ...]]) -> Any:
+    tables = _tables_in(annotation)
+    if isinstance(value, dict) and tables:
+        fitting = max(tables, key=lambda table: len(set(table.model_fields) & set(value)))
+        return _lenient(fitting, value, place, wrong)
+    if isinstance(value, list) and tables:
+        return [_lenient_value(annotation, item, (*place, number), wrong) for number, item in enumerate(value)]
+    return None if any(other[: len(place)] == place for other in wrong) else value
+
+
+def _tables_in(annotation: Any) -> list[type[BaseModel]]:
+    found = []
+    for branch in _branches(annotation):
+        if isinstance(branch, type) and issubclass(branch, BaseModel):
+            found.append(branch)
+        else:
+            found += [table for inner in get_args(branch) for table in _tables_in(inner)]
+    return found
 
 
 def dotted(location: Iterable[str | int]) -> str:
@@ -188,14 +266,7 @@ def _model(model: type[BaseModel] | None, location: tuple[str | int, ...]) -> ty
 
 
 def _table_in(annotation: Any) -> type[BaseModel] | None:
-    for branch in _branches(annotation):
-        if isinstance(branch, type) and issubclass(branch, BaseModel):
-            return branch
-        for inner in get_args(branch):
-            found = _table_in(inner)
-            if found is not None:
-                return found
-    return None
+    return next(iter(_tables_in(annotation)), None)
 
 
 def _field(model: type[BaseModel], location: tuple[str | int, ...]) -> FieldInfo | None:

@@ -1,7 +1,8 @@
-"""TOML files, read in one way: size, encoding and layout are checked, and every fault is one sentence."""
+"""TOML files, read in one way: every fault is one sentence (``rtsim.outside`` opens them)."""
 
 from __future__ import annotations
 
+import re
 import tomllib
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -9,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rtsim.errors import InputError, closest, suggestion
+from rtsim.outside import LARGEST_TEXT, read_text
 
-MAX_BYTES = 1_000_000
-"""A larger file is refused before it is read [bytes]."""
+_LONGEST_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++\s*+\.\s*+){100}""")
+"""Dotted keys take the parser a time that grows with the square of their length."""
+_WHOLE_NUMBERS = range(-(2**63), 2**63)
 
 
 def shipped_names(folder: str) -> list[str]:
@@ -35,7 +38,7 @@ def shipped_toml(folder: str, name: str) -> dict[str, Any]:
 
 
 def named_text(
-    name_or_path: str | Path, *, folder: str, noun: str, key: str, largest: int = MAX_BYTES
+    name_or_path: str | Path, *, folder: str, noun: str, key: str, largest: int = LARGEST_TEXT
 ) -> tuple[str, str]:
     """The text of a file given by path, or of one that comes with rtsim given by name.
 
@@ -67,35 +70,6 @@ def named_text(
     )
 
 
-def read_text(path: str | Path, *, noun: str, largest: int = MAX_BYTES, missing: str = "check the path") -> str:
-    """The text of a file that somebody gave.
-
-    Args:
-        path: The file.
-        noun: What it should be, without article.
-        largest: Size of the largest file that is read [bytes].
-        missing: What to do where there is none.
-
-    Raises:
-        InputError: It is not there, no file, too large, no text, or must not be read.
-    """
-    file, shown = Path(path), str(path)
-    try:
-        if file.is_dir():
-            raise InputError("is a directory", file=shown, mend=f"name a {noun} file")
-        if file.stat().st_size > largest:
-            raise InputError(f"is too large for a {noun}", file=shown, allowed=f"at most {largest} bytes")
-        return file.read_text(encoding="utf-8-sig")  # some editors begin UTF-8 files with a mark
-    except FileNotFoundError:
-        raise InputError("does not exist", file=shown, mend=missing) from None
-    except UnicodeDecodeError as error:
-        problem = f"is not a text file (byte {error.start} is not UTF-8)"
-        raise InputError(problem, file=shown, mend="save it as UTF-8") from None
-    except OSError as error:
-        problem = f"cannot be read: {_lower(error.strerror or str(error))}"
-        raise InputError(problem, file=shown, mend="check its permissions") from None
-
-
 def parse_toml(text: str, *, file: str) -> dict[str, Any]:
     """The tables of a text.
 
@@ -105,25 +79,47 @@ def parse_toml(text: str, *, file: str) -> dict[str, Any]:
     Raises:
         InputError: It is not valid TOML.
     """
+    deep = InputError("is nested too deeply", file=file, mend="write flat tables")
+    if _LONGEST_KEY.search(text):
+        raise deep
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        document = tomllib.loads(text)
+        _refuse_large_numbers(document, "", file)
+    except InputError:
+        raise
+    except ValueError as error:  # a number of more than 4300 digits is one that is no TOMLDecodeError
         raise InputError(f"is not valid TOML: {_lower(str(error))}", file=file, mend="correct this line") from None
     except RecursionError:
-        raise InputError("is nested too deeply", file=file, mend="write flat tables") from None
+        raise deep from None
+    return document
 
 
-def read_toml(path: str | Path, *, noun: str) -> dict[str, Any]:
+def _refuse_large_numbers(value: Any, key: str, file: str) -> None:
+    """Whole numbers of TOML have 64 bits; Python's know no end, and cannot be taken for decimals then."""
+    if isinstance(value, dict):
+        for name, part in value.items():
+            _refuse_large_numbers(part, f"{key}.{name}" if key else name, file)
+    elif isinstance(value, list):
+        for place, part in enumerate(value):
+            _refuse_large_numbers(part, f"{key}[{place}]", file)
+    elif isinstance(value, int) and value not in _WHOLE_NUMBERS:
+        raise InputError(
+            "is too large a number", file=file, key=key, allowed="whole numbers of 64 bits", mend="correct it"
+        )
+
+
+def read_toml(path: str | Path, *, noun: str, may_be_empty: bool = False) -> dict[str, Any]:
     """The tables of a file that somebody gave.
 
     Args:
         path: The file.
         noun: What it should be, without article.
+        may_be_empty: Whether an empty file means something.
 
     Raises:
         InputError: It cannot be read, or is not valid TOML.
     """
-    return parse_toml(read_text(path, noun=noun), file=str(path))
+    return parse_toml(read_text(path, noun=noun, may_be_empty=may_be_empty), file=str(path))
 
 
 def _shipped(folder: str) -> Traversable:

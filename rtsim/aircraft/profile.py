@@ -21,7 +21,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from rtsim.errors import InputError
-from rtsim.toml_file import parse_toml, read_text, shipped_toml
+from rtsim.outside import read_text
+from rtsim.toml_file import parse_toml, shipped_toml
 
 PartName = Literal["nacelle", "corridor", "protection", "systems", "controls", "dimensions", "pilot", "aids"]
 PARTS: tuple[PartName, ...] = get_args(PartName)

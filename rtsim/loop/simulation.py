@@ -11,12 +11,13 @@ import numpy as np
 
 from rtsim.aids.design import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
+from rtsim.arguments import instance, whole_number
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import add_gust, set_turbulence
 from rtsim.atmosphere.specification import Gust, Turbulence
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import Command, Margins, Reference, Sensors
-from rtsim.errors import InputError
+from rtsim.errors import InputError, suggestion
 from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
@@ -70,6 +71,8 @@ class Simulation:
         Raises:
             InputError: The start has no trim or lies outside the database.
         """
+        instance(setup, FlightSetup, "setup", "make one: FlightSetup(programme=...)")
+        instance(setup.programme, Programme, "setup.programme", "make one: Programme.hold(...)")
         self.setup = setup
         self._parts: Parts = build_parts(setup) if parts is None else parts
         self.flying: Flying = prepare(setup, self._parts)
@@ -187,6 +190,9 @@ class Simulation:
             The frame's row, shape (SIGNAL_COUNT,), a new array.
         """
         row: FloatArray = np.empty(SIGNAL_COUNT)
+        for key, given in (("command", command), ("applied", applied)):
+            if given is not None and type(given) is not Command:
+                instance(given, Command, key, "give Command(stick, lever, nacelle_rate)")
         if command is None and applied is None:
             self._fly(row, 1, WHOLE)
             return row
@@ -210,7 +216,11 @@ class Simulation:
         Returns:
             The rows, shape (frames flown, SIGNAL_COUNT).
         """
+        frames = whole_number(frames, "frames")
         rows = np.empty((frames, SIGNAL_COUNT)) if rows is None else rows
+        if rows.ndim != 2 or len(rows) < frames or rows.shape[1] != SIGNAL_COUNT or not rows.flags.c_contiguous:
+            allowed = f"at least {frames} x {SIGNAL_COUNT}, contiguous"
+            raise InputError("has the wrong shape", key="rows", value=rows.shape, allowed=allowed)
         return rows[: self._fly(rows.reshape(-1), frames, WHOLE)]
 
     def _fly(self, rows: FloatArray, frames: int, stages: int) -> int:
@@ -227,6 +237,9 @@ class Simulation:
             mode: ``mocm``, ``external`` (the caller gives commands) or ``hold`` (controls stay where they are).
             command: Controls to hold from now on; None: those that acted last.
         """
+        if mode not in MODES:
+            mend = suggestion(str(mode), MODES, otherwise="choose one")
+            raise InputError("is no mode of the pilot", key="mode", value=mode, allowed=", ".join(MODES), mend=mend)
         if command is not None:
             self._state.u[INPUT.stick], self._state.u[INPUT.lever] = command.stick, command.lever
         if mode == "mocm" and self.mode != "mocm":
@@ -369,6 +382,7 @@ class Simulation:
         Args:
             snapshot: From ``snapshot`` of a simulation with the same setup.
         """
+        instance(snapshot, Snapshot, "snapshot", "give what snapshot() returned")
         self.flying.take(snapshot.state)
         pilot, air = self.flying.streams
         pilot.bit_generator.state = snapshot.random_stream["generator"]

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from rtsim.aircraft.points import TrimPoint
 from rtsim.aircraft.variables import position, required_position
+from rtsim.arguments import number, vector
 from rtsim.arrays import FloatArray
-from rtsim.errors import InputError, TrimError
+from rtsim.errors import InputError, TrimError, suggestion
 from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.grid_kernels import cell
 from rtsim.kernels.packed import packed
@@ -21,7 +22,7 @@ from rtsim.kernels.parts import entry_point
 from rtsim.lpv import lpv_kernels as kernels
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
-from rtsim.lpv.tables import Form, Refresh, prepare_tables
+from rtsim.lpv.tables import FORMS, REFRESHES, Form, Refresh, prepare_tables
 from rtsim.units import to_deg, to_kt
 
 if TYPE_CHECKING:
@@ -52,6 +53,10 @@ class LpvAircraft:
 
     def __post_init__(self) -> None:
         """Pack the database for the kernels."""
+        for key, value, known in (("form", self.form, FORMS), ("refresh", self.refresh, REFRESHES)):
+            if value not in known:
+                mend = suggestion(str(value), known, otherwise="choose one")
+                raise InputError("is not known", key=key, value=value, allowed=", ".join(known), mend=mend)
         tables = prepare_tables(self.database, self.form, refresh=self.refresh)
         object.__setattr__(self, "tables", tables)
         object.__setattr__(self, "_work", np.zeros(interpreted(kernels.work_size)(tables)))
@@ -72,6 +77,7 @@ class LpvAircraft:
         Returns:
             The state derivative (nx,).
         """
+        x, u = vector(x, "x", len(self.database.states)), vector(u, "u", len(self.database.inputs))
         xdot = np.empty(x.size)
         self._work[kernels.WORK.flags] = 0.0
         kernels.lpv_derivative(self.tables, x, u, nacelle_angle, xdot, self._work)
@@ -86,6 +92,7 @@ class LpvAircraft:
         Returns:
             The outputs (ny,).
         """
+        x, u = vector(x, "x", len(self.database.states)), vector(u, "u", len(self.database.inputs))
         y = np.empty(len(self.database.outputs))
         self._work[kernels.WORK.flags] = 0.0
         kernels.lpv_outputs(self.tables, x, u, nacelle_angle, y, self._work)
@@ -115,6 +122,9 @@ class LpvAircraft:
         """
         # The held entry point looks at no types: these are the ones it was compiled for.
         end, u = np.array(x, dtype=np.float64, order="C"), np.ascontiguousarray(u, dtype=np.float64)
+        d = self.database
+        if end.shape != d.x_ref.shape[-1:] or u.shape != d.u_ref.shape[-1:]:  # it would write where nothing is its own
+            end, u = vector(x, "x", len(d.states)), vector(u, "u", len(d.inputs))
         step = self._step
         if step is None:
             arguments = (self._stepping, end, u, nacelle_angle, nacelle_rate, nacelle_acceleration, dt)
@@ -136,6 +146,7 @@ class LpvAircraft:
             InputError: Airspeed or nacelle angle outside the grid.
         """
         self._require_inside(airspeed, nacelle)
+        number(acceleration, "acceleration", "m/s^2")
         x, u, free = self._interpolated_trim(airspeed, nacelle, acceleration)
         unknown = np.concatenate([np.flatnonzero(np.arange(x.size) != self._altitude()), x.size + free])
         z = np.concatenate([x, u])
@@ -177,8 +188,8 @@ class LpvAircraft:
         """
         import control
 
+        self._require_inside(airspeed, nacelle)
         if not self.is_valid(airspeed=airspeed, nacelle=nacelle):
-            self._require_inside(airspeed, nacelle)
             where = f"{to_kt(airspeed):.4g} kn at nacelle {to_deg(nacelle):.4g} deg"
             raise TrimError(f"the database has no level-flight trim around {where}", mend="see database.valid")
         A, B, C, D = self.matrices(airspeed=airspeed, nacelle=nacelle)
@@ -260,6 +271,7 @@ class LpvAircraft:
 
     def _require_inside(self, airspeed: float, nacelle: float) -> None:
         d = self.database
+        airspeed, nacelle = number(airspeed, "airspeed", "m/s"), number(nacelle, "nacelle", "rad")
         degrees = f"angles are in radians: write nacelle=deg({nacelle:g}) with rtsim.units.deg"
         nonlinear = "choose a value in this range, or solve the nonlinear model there (--nonlinear)"
         for name, value, axis, shown, unit in (

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import time
-import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +21,12 @@ from rtsim.errors import InputError
 from rtsim.optimization.methods import feasibility_order, make_method
 from rtsim.optimization.problem import CONSTRAINTS, ConversionProblem, Evaluation
 from rtsim.optimization.spec import SearchSpec
+from rtsim.outside import read_arrays, understanding
 from rtsim.whole_file import whole_file
 
 RECORD_FORMAT = 1
+LARGEST_RECORD = 1_000_000_000
+"""Size of the largest record that is read [bytes]."""
 
 
 class Evaluator(Protocol):
@@ -138,21 +140,18 @@ class Record:
             )
 
     def _read(self, path: Path) -> None:
-        try:
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-                if int(data["format"]) != RECORD_FORMAT:
-                    raise ValueError
-                fingerprint = str(data["fingerprint"])
-                ends = np.cumsum(data["sizes"])[:-1]
-                parts = [np.split(data[name], ends) for name in ("variables", "objectives", "constraints")]
-        except (OSError, ValueError, TypeError, LookupError, EOFError, zipfile.BadZipFile):
-            # numpy's own words would advise to unpickle the file: they are left out.
-            raise InputError(
-                "is not the record of a search, or is damaged",
-                file=str(path),
-                mend="delete it and search anew without --resume",
-            ) from None
-        if fingerprint != self.fingerprint:
+        mend = "delete it and search anew without --resume"
+        data = read_arrays(path, noun="record of a search", largest=LARGEST_RECORD, mend=mend)
+        with understanding("record of a search", file=path, mend=mend):
+            if data["format"].item() != RECORD_FORMAT:
+                raise ValueError("its format is another one")
+            written = str(data["fingerprint"].item())
+            sizes = data["sizes"].astype(np.int64, casting="same_kind")
+            columns = [data[name].astype(np.float64, casting="same_kind") for name in Evaluation.__slots__]
+            if any(values.ndim != 2 or len(values) != sizes.sum() for values in columns) or np.any(sizes < 1):
+                raise ValueError("its arrays do not fit together")
+            parts = [np.split(values, np.cumsum(sizes)[:-1]) for values in columns]
+        if written != self.fingerprint:
             raise InputError(
                 "is the record of another search (specification or database differ)",
                 file=str(path),

@@ -13,7 +13,7 @@ from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.optimization.path import AccelerationCaps
 from rtsim.optimization.paths import FAST_SIDE_CAPS, NEAR_STALL_CAPS, PATH_NAMES
-from rtsim.strict import Strict, checked
+from rtsim.strict import Examined, Strict, checked
 from rtsim.toml_file import read_toml
 
 Objective = Literal[
@@ -156,10 +156,20 @@ def load_spec(path: str | Path, changes: Mapping[str, Any] | None = None) -> Sea
         InputError: It does not exist, is no TOML, or has a key or value that is not allowed (the first one found).
     """
     data = read_toml(path, noun="search specification")
-    flight = data.get("flight")
-    if isinstance(flight, dict) and isinstance(flight.get("database"), str):  # it lies beside the file
-        flight["database"] = str((Path(path).parent / flight["database"]).resolve())
+    place_database(data, path)
     return checked_spec(data, changes, file=str(path))
+
+
+def place_database(data: Mapping[str, Any], path: str | Path) -> None:
+    """Name the database of a specification by its whole path: it lies beside the file.
+
+    Args:
+        data: The tables; changed.
+        path: The file.
+    """
+    flight = data.get("flight")
+    if isinstance(flight, dict) and isinstance(flight.get("database"), str) and flight["database"]:
+        flight["database"] = str((Path(path).parent / flight["database"]).resolve())
 
 
 def checked_spec(
@@ -181,15 +191,39 @@ def checked_spec(
             table, _, name = key.rpartition(".")
             (whole[table] if table else whole)[name] = value
         spec = checked(SearchSpec, whole, file=None)
-    if len(set(spec.objectives)) != len(spec.objectives):
-        raise InputError("names an objective twice", file=file, key="objectives", value=list(spec.objectives))
-    if len(spec.objectives) > 1 and spec.search.method != "nsga2":
-        raise InputError(
-            "cannot minimize several objectives at once",
-            file=file,
-            key="search.method",
-            value=spec.search.method,
-            allowed="nsga2",
-            mend="choose nsga2 or one objective",
-        )
+    for problem in _contradictions(spec, file):
+        raise problem
     return spec
+
+
+def spec_problems(data: Mapping[str, Any], *, file: str) -> list[InputError]:
+    """All mistakes of a specification file.
+
+    Args:
+        data: The tables.
+    """
+    examined = Examined(SearchSpec, data, file=file)
+    examined.ask(lambda spec: _contradictions(spec, file))
+    return examined.problems
+
+
+def _contradictions(spec: SearchSpec, file: str | None) -> list[InputError]:
+    """Mistakes that involve more than one key."""
+    found = []
+    if len(set(spec.objectives)) != len(spec.objectives):
+        mend = "name each once"
+        found.append(
+            InputError("names an objective twice", file=file, key="objectives", value=spec.objectives, mend=mend)
+        )
+    if len(spec.objectives) > 1 and spec.search.method != "nsga2":
+        found.append(
+            InputError(
+                "cannot minimize several objectives at once",
+                file=file,
+                key="search.method",
+                value=spec.search.method,
+                allowed="nsga2",
+                mend="choose nsga2 or one objective",
+            )
+        )
+    return found

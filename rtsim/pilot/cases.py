@@ -140,17 +140,28 @@ def load_cases(path: str | Path) -> CaseFile:
     Raises:
         InputError: The file cannot be read or is not laid out as a case file.
     """
-    shown = str(path)
-    document = read_toml(path, noun="case")
+    return cases_of(read_toml(path, noun="case"), str(path))
+
+
+def cases_of(document: Mapping[str, Any], shown: str) -> CaseFile:
+    """Take the problems from the tables of a case file.
+
+    Args:
+        document: The tables.
+        shown: How to call the file in messages.
+
+    Raises:
+        InputError: It is not laid out as a case file.
+    """
     cases: list[Case] = []
     kinds: tuple[Literal["case", "reject"], ...] = ("case", "reject")
     for kind in kinds:
         for name, table in _table(document.get(kind, {}), shown, kind).items():
             cases.append(_case(_table(table, shown, f"{kind}.{name}"), name=name, kind=kind, path=shown))
     if not cases and "input" in document:
-        cases.append(_case(document, name=Path(path).stem, kind="case", path=shown))
+        cases.append(_case(document, name=Path(shown).stem, kind="case", path=shown))
     elif not cases and "A" in document:
-        cases.append(_case({"input": document}, name=Path(path).stem, kind="case", path=shown))
+        cases.append(_case({"input": document}, name=Path(shown).stem, kind="case", path=shown))
     if not cases:
         raise InputError(
             "holds no design problem", file=shown, mend="add [case.NAME.input] with A, B, C, E, q_y, tau_n"

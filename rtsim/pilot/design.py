@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rtsim.arrays import ComplexArray, FloatArray
-from rtsim.errors import InputError
+from rtsim.errors import InputError, suggestion
 from rtsim.pilot.estimator import Estimator, InternalModel, design_estimator, internal_model
 from rtsim.pilot.modes import check_modes
 from rtsim.pilot.problem import DEFAULT_MOTOR_NOISE_RATIO, MocmError, MocmProblem, PadeKind, build_problem
@@ -166,41 +166,56 @@ def _statistics(
     )
 
 
-def _pick(labels: list[str], wanted: Sequence[str | int] | None, key: str) -> list[int]:
-    """Turn signal names or numbers into numbers."""
+def _pick(labels: list[str], wanted: object, key: str) -> list[int]:
+    """Turn signal names or numbers into numbers; one name or number stands for a list of it."""
     if wanted is None:
         return list(range(len(labels)))
     numbers = []
-    for item in wanted:
+    for item in [wanted] if isinstance(wanted, (str, int, np.integer)) else _entries(wanted, key):
         if isinstance(item, str) and item in labels:
             numbers.append(labels.index(item))
-        elif isinstance(item, (int, np.integer)) and 0 <= int(item) < len(labels):
+        elif isinstance(item, (int, np.integer)) and not isinstance(item, bool) and 0 <= int(item) < len(labels):
             numbers.append(int(item))
         else:
-            raise InputError("is not a signal of the plant", key=key, value=item, allowed=", ".join(labels))
+            mend = suggestion(item, labels, otherwise="name one") if isinstance(item, str) else "name one"
+            raise InputError("is not a signal of the plant", key=key, value=item, allowed=", ".join(labels), mend=mend)
+    if len(set(numbers)) < len(numbers):
+        raise InputError("names a signal twice", key=key, value=wanted, mend="name each once")
     return numbers
 
 
-def _plant_arrays(
-    plant: Plant,
-    controls: Sequence[str | int] | None,
-    disturbances: Sequence[str | int] | None,
-    displays: Sequence[str | int] | None,
-) -> dict[str, object]:
+def _entries(wanted: object, key: str) -> list[object]:
+    try:
+        return list(wanted)  # type: ignore[call-overload, no-any-return]
+    except TypeError:
+        mend = "give a list of names or numbers"
+        raise InputError("is no list of signals", key=key, value=wanted, mend=mend) from None
+
+
+def _plant_arrays(plant: Plant, controls: object, disturbances: object, displays: object) -> dict[str, object]:
     """Split a plant into the fields A, B, C, D and, where its inputs hold disturbances, E."""
     if isinstance(plant, (tuple, list)):
         if len(plant) not in (3, 4):
             raise MocmError("E_DIM", "is neither (A, B, C) nor (A, B, C, D)", key="plant", value=len(plant))
-        arrays = [np.atleast_2d(np.asarray(part, dtype=np.float64)) for part in plant]
+        arrays = [_real(part, name) for part, name in zip(plant, "ABCD", strict=False)]
         a, b, c = arrays[:3]
         d = arrays[3] if len(arrays) == 4 else np.zeros((c.shape[0], b.shape[1]))
         inputs, outputs = [str(i) for i in range(b.shape[1])], [str(i) for i in range(c.shape[0])]
     else:
+        system: Any = plant
+        if not all(hasattr(system, name) for name in (*"ABCD", "input_labels", "output_labels")):
+            raise MocmError(
+                "E_DIM", f"is a {type(plant).__name__}", key="plant",
+                allowed="control.StateSpace, arrays (A, B, C[, D]), or a MocmProblem",
+                mend="give a state space model (control.ss makes one of a transfer function)",
+            )  # fmt: skip
         if getattr(plant, "dt", 0) not in (0, None):
             raise MocmError("E_DIM", "is sampled", key="plant", mend="give a continuous-time plant")
-        a, b, c, d = (np.asarray(getattr(plant, name), dtype=np.float64) for name in "ABCD")
-        system: Any = plant
+        a, b, c, d = (_real(getattr(system, name), name) for name in "ABCD")
         inputs, outputs = list(system.input_labels), list(system.output_labels)
+    if d.shape != (c.shape[0], b.shape[1]) or len(b) != len(a) or c.shape[1] != len(a) or a.shape[0] != a.shape[1]:
+        shapes = ", ".join(str(matrix.shape) for matrix in (a, b, c, d))
+        raise MocmError("E_DIM", f"has matrices that do not fit together: {shapes}", key="plant")
     rows = _pick(outputs, displays, "displays")
     noise = [] if disturbances is None else _pick(inputs, disturbances, "disturbances")
     hands = [i for i in _pick(inputs, controls, "controls") if controls is not None or i not in noise]
@@ -215,12 +230,26 @@ def _plant_arrays(
     return fields
 
 
+def _real(value: Any, name: str) -> FloatArray:
+    """A matrix of real numbers."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf":
+            raise TypeError
+        matrix = np.atleast_2d(array.astype(np.float64))
+    except (TypeError, ValueError):
+        raise MocmError("E_DIM", "is not a rectangular array of real numbers", key=f"plant {name}") from None
+    if matrix.ndim != 2:
+        raise MocmError("E_DIM", f"has {matrix.ndim} dimensions", key=f"plant {name}", allowed="a matrix")
+    return matrix
+
+
 def design_mocm(
     plant: Plant,
     *,
-    controls: Sequence[str | int] | None = None,
-    disturbances: Sequence[str | int] | None = None,
-    displays: Sequence[str | int] | None = None,
+    controls: str | int | Sequence[str | int] | None = None,
+    disturbances: str | int | Sequence[str | int] | None = None,
+    displays: str | int | Sequence[str | int] | None = None,
     disturbance_matrix: npt.ArrayLike | None = None,
     disturbance_intensity: npt.ArrayLike | None = None,
     display_weights: npt.ArrayLike = 1.0,
@@ -243,7 +272,7 @@ def design_mocm(
 
     Args:
         plant: A ``control.StateSpace`` (continuous time), arrays (A, B, C[, D]), or a checked `MocmProblem`.
-        controls: Names or numbers of the inputs that are the pilot's; default all that are no disturbances.
+        controls: Names or numbers of the inputs that are the pilot's, or one; default all that are no disturbances.
         disturbances: Names or numbers of the inputs that are white disturbances.
         displays: Names or numbers of the outputs the pilot sees; default all.
         disturbance_matrix: E (n, nw), where the disturbances are no inputs of ``plant``.
@@ -269,11 +298,13 @@ def design_mocm(
         MocmError: No pilot can be designed; ``code`` names the reason.
         InputError: A signal name is not known.
     """
+    if start is not None and not isinstance(start, MocmDesign):
+        raise InputError("is no design of a pilot", key="start", value=start, mend="give what design_mocm returned")
     if isinstance(plant, MocmProblem):
         return design_problem(plant, start=start)
     fields = _plant_arrays(plant, controls, disturbances, displays)
     if disturbance_matrix is not None:
-        fields["E"] = np.asarray(disturbance_matrix)
+        fields["E"] = disturbance_matrix
     if neuromotor_lag is None and control_rate_weights is None:
         neuromotor_lag = 0.1
     fields |= {

@@ -15,6 +15,7 @@ from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
 from rtsim.lpv.database import Database
+from rtsim.outside import understanding
 from rtsim.pilot import layout_kernels as kernels
 from rtsim.pilot.delay import delay_filter
 from rtsim.pilot.design_plant import CONTROLS, PlantLayout, plant_layout
@@ -56,7 +57,9 @@ def load_pilot_tables(database: Database, outer_loop: OuterLoop = "integrators",
     def prepare() -> PilotTables:
         from rtsim.pilot.schedule import ScheduledPilot
 
-        return _tables(database, ScheduledPilot.from_arrays(database.pilot[outer_loop]), dt)
+        mend = "design the pilots anew (rtsim model import FILE --design-pilots)"
+        with understanding("pilot of a database", file=f"pilot/{outer_loop}", mend=mend):
+            return _tables(database, ScheduledPilot.from_arrays(database.pilot[outer_loop]), dt)
 
     return packed(kept("pilot", f"{database.content_hash} {outer_loop} {dt!r}".encode(), prepare))
 

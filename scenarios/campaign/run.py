@@ -26,6 +26,7 @@ from scenarios.campaign.chunks import (
     present_folder,
 )
 from scenarios.campaign.executors import Executor, LocalExecutor
+from scenarios.campaign.preflight import scenario_problems
 from scenarios.campaign.spec import CampaignFile
 from scenarios.campaign.store import Store
 from scenarios.campaign.verdict import Flights, Judged, decided, judge, summarize
@@ -229,6 +230,8 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
     folder = present_folder()
     for name in (tested, *against):
         law_chain(name, folder)
+    for problem in scenario_problems(spec, file):
+        raise problem
     names = [tested, *(name for name in against if name not in {tested, "off"})]
     laws = [LawVariant(name) for name in names]
     for buffer in options.buffers_kt:

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, ValidationError, create_model
+from pydantic import BaseModel, Field, create_model
 
 from rtsim.choices import CorridorName
 from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
-from rtsim.strict import Strict, explain
+from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
 from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
@@ -228,13 +228,24 @@ def parse_campaign(text: str, *, file: str) -> tuple[CampaignFile | None, list[I
         The campaign and no problems, or None and at least one.
     """
     try:
-        spec = CampaignFile.model_validate(parse_toml(text, file=file))
+        examined = examine_campaign(text, file=file)
     except InputError as error:
         return None, [error]
-    except ValidationError as error:
-        return None, explain(error, CampaignFile, file)
-    problems = _contradictions(spec, file)
-    return (None, problems) if problems else (spec, [])
+    return (None, examined.problems) if examined.problems else (examined.content, [])
+
+
+def examine_campaign(text: str, *, file: str) -> Examined[CampaignFile]:
+    """Find every mistake that a text shows by itself.
+
+    Args:
+        text: The TOML text.
+
+    Raises:
+        InputError: It is not valid TOML.
+    """
+    examined = Examined(CampaignFile, parse_toml(text, file=file), file=file)
+    examined.ask(lambda spec: _class_contradictions(spec, file), lambda spec: _expectation_contradictions(spec, file))
+    return examined
 
 
 def draw(number: Number, generator: Generator) -> float:
@@ -257,7 +268,7 @@ def draw(number: Number, generator: Generator) -> float:
     return number
 
 
-def _contradictions(spec: CampaignFile, file: str) -> list[InputError]:
+def _class_contradictions(spec: CampaignFile, file: str) -> list[InputError]:
     found: list[InputError] = []
     names = [item.name for item in spec.classes]
     for number, item in enumerate(spec.classes):
@@ -266,6 +277,12 @@ def _contradictions(spec: CampaignFile, file: str) -> list[InputError]:
             found.append(InputError("is used twice", file=file, key=f"{key}.name", value=item.name))
         found += [InputError(problem, file=file, key=f"{key}{place}", mend=mend) for place, problem, mend in _odd(item)]
         found += _number_problems(item, key, file)
+    return found
+
+
+def _expectation_contradictions(spec: CampaignFile, file: str) -> list[InputError]:
+    found: list[InputError] = []
+    names = [item.name for item in spec.classes]
     for number, clause in enumerate(spec.expect):
         key = f"expect[{number}]"
         if clause.event not in EVENTS:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from rtsim.errors import InputError, OutputError
+from rtsim.outside import LARGEST_TEXT, read_arrays, read_bytes, understanding
 from rtsim.whole_file import whole_file, write_whole
 from scenarios.campaign.chunks import Chunk, ChunkResult
 
 IDENTITY_FILE = "campaign.json"
+LARGEST_PIECE = 200_000_000
+"""Size of the largest piece that is read [bytes]."""
 
 
 class Store:
@@ -28,24 +31,23 @@ class Store:
             fresh: Throw finished pieces of another campaign away.
 
         Raises:
-            InputError: The folder holds another campaign.
+            InputError: The folder holds another campaign, or does not say which.
             OutputError: It cannot be written.
         """
         self._folder, self._chunks = folder, folder / "chunks"
+        self._laws, self._values = len(identity["laws"]), len(identity["metrics"])
         try:
             self._chunks.mkdir(parents=True, exist_ok=True)
-            known = self._identity()
+            known = None if fresh else self._identity()
             if known is not None and known != identity:
-                if not fresh:
-                    differing = sorted(key for key in {*known, *identity} if known.get(key) != identity.get(key))
-                    raise InputError(
-                        f"the folder holds another campaign (it differs in {', '.join(differing)})",
-                        key="--out",
-                        value=str(folder),
-                        mend="give another folder, or --fresh to begin anew",
-                    )
-                self._clear()
-            elif fresh:
+                differing = sorted(key for key in {*known, *identity} if known.get(key) != identity.get(key))
+                raise InputError(
+                    f"the folder holds another campaign (it differs in {', '.join(differing)})",
+                    key="--out",
+                    value=str(folder),
+                    mend="give another folder, or --fresh to begin anew",
+                )
+            if fresh:
                 self._clear()
             self.write(IDENTITY_FILE, json.dumps(identity, indent=1, sort_keys=True).encode())
         except OSError as error:
@@ -59,17 +61,17 @@ class Store:
         """
         path = self._chunks / _name(chunk)
         try:
-            with np.load(path, allow_pickle=False) as data:
-                problems = json.loads(str(data["problems"]))
-                result = ChunkResult(
-                    chunk,
-                    data["metrics"].copy(),
-                    tuple((int(run), int(law), str(text)) for run, law, text in problems),
-                    data["seconds"].copy(),
-                )
-        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+            data = read_arrays(path, noun="piece of a campaign", largest=LARGEST_PIECE, mend="fly it again")
+            with understanding("piece of a campaign", file=path, mend="fly it again"):
+                problems = TypeAdapter(tuple[tuple[int, int, str], ...]).validate_json(str(data["problems"].item()))
+                metrics = data["metrics"].astype(np.float64, casting="same_kind")
+                seconds = data["seconds"].astype(np.float64, casting="same_kind")
+        except InputError:
             return None
-        return result if len(result.metrics) == chunk.count else None
+        shape = (chunk.count, self._laws, self._values)
+        if metrics.shape != shape or seconds.shape != shape[1:2] or any(law >= self._laws for _, law, _ in problems):
+            return None
+        return ChunkResult(chunk, metrics, problems, seconds)
 
     def save(self, result: ChunkResult) -> None:
         """Keep a finished piece.
@@ -104,10 +106,15 @@ class Store:
         return path
 
     def _identity(self) -> Any:
-        try:
-            return json.loads((self._folder / IDENTITY_FILE).read_text(encoding="utf-8"))
-        except (FileNotFoundError, ValueError):
-            return None
+        """What the folder says of itself; None where nothing is in it."""
+        path, mend = self._folder / IDENTITY_FILE, "give another folder, or --fresh to begin anew"
+        if not path.exists():
+            if not any(self._chunks.glob("*.npz")):
+                return None
+            raise InputError("is missing beside pieces of a campaign", file=str(path), mend=mend)
+        data = read_bytes(path, noun="campaign's identity", largest=LARGEST_TEXT, missing=mend)
+        with understanding("campaign's identity", file=path, mend=mend):
+            return TypeAdapter(dict[str, Any]).validate_python(json.loads(data.decode("utf-8-sig")))
 
     def _clear(self) -> None:
         for path in self._chunks.glob("*.npz"):

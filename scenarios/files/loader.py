@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
-from rtsim.strict import explain
+from rtsim.strict import Examined
 from rtsim.toml_file import named_text, parse_toml, shipped_names
 from rtsim.units import deg, kt
 from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
@@ -72,18 +71,26 @@ def parse_scenario(text: str, *, file: str) -> tuple[Scenario | None, list[Input
         The scenario and no problems, or None and at least one.
     """
     try:
-        content = ScenarioFile.model_validate(parse_toml(text, file=file))
+        examined = examine_scenario(text, file=file)
+        if examined.problems:
+            return None, examined.problems
+        return scenario_of(examined.content, text, file), []
     except InputError as error:
         return None, [error]
-    except ValidationError as error:
-        return None, explain(error, ScenarioFile, file)
-    problems = _contradictions(content, file)
-    if problems:
-        return None, problems
-    try:
-        return _scenario(content, text, file), []
-    except InputError as error:
-        return None, [InputError(str(error).rstrip("."), file=file)]
+
+
+def examine_scenario(text: str, *, file: str) -> Examined[ScenarioFile]:
+    """Find every mistake that a text shows by itself.
+
+    Args:
+        text: The TOML text.
+
+    Raises:
+        InputError: It is not valid TOML.
+    """
+    examined = Examined(ScenarioFile, parse_toml(text, file=file), file=file)
+    examined.ask(*(functools.partial(check, file=file) for check in _CHECKS))
+    return examined
 
 
 def named_start(condition: str, *, altitude: float = DEFAULT_ALTITUDE) -> ProgrammePoint:
@@ -109,17 +116,15 @@ def _read(name_or_path: str | Path) -> tuple[str, str]:
     return named_text(name_or_path, folder=LIBRARY, noun="scenario", key="scenario", largest=MAX_FILE_BYTES)
 
 
-def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
-    """Mistakes that involve more than one key."""
-    found = _start_contradictions(content, file)
-    if content.programme is None and content.duration_s is None:
-        found.append(InputError("is missing", file=file, key="duration_s", mend="add it: a hold has no end of its own"))
-    if content.programme is not None:
-        found += _point_contradictions(content.programme, file)
-    found += disturbance_problems(content.air, content.faults, file)
+def _other_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
+    found = disturbance_problems(content.air, content.faults, file)
     found += automatic_problems(content.automatic, given(content.flight).get("nacelle", ""), file)
     events, flight = bool(content.events), given(content.flight)
-    found += trial_problems(content.pulses, content.trial, has_events=events, flight=flight, file=file)
+    return found + trial_problems(content.pulses, content.trial, has_events=events, flight=flight, file=file)
+
+
+def _expectation_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
+    found = []
     for number, clause in enumerate(content.expect):
         from rtsim.measures.metrics import METRIC_NAMES  # loads compiled code
 
@@ -132,7 +137,7 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
                     key=f"{key}.metric",
                     value=clause.metric,
                     allowed=", ".join(METRIC_NAMES),
-                    mend=suggestion(clause.metric, METRIC_NAMES, otherwise="choose one"),
+                    mend=suggestion(str(clause.metric), METRIC_NAMES, otherwise="choose one"),
                 )
             )
         if clause.min is None and clause.max is None:
@@ -153,6 +158,8 @@ def _contradictions(content: ScenarioFile, file: str) -> list[InputError]:
 
 def _start_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     start, found = content.start, []
+    if content.programme is None and content.duration_s is None:
+        found.append(InputError("is missing", file=file, key="duration_s", mend="add it: a hold has no end of its own"))
     numbers = start.airspeed_kt is not None or start.nacelle_deg is not None
     if start.condition is not None and numbers:
         found.append(
@@ -173,8 +180,11 @@ def _start_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     return found
 
 
-def _point_contradictions(programme: ProgrammeTable, file: str) -> list[InputError]:
+def _point_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
     """Points are either all timed, or none is; a timed point has no rates."""
+    programme = content.programme
+    if programme is None:
+        return []
     timed = [point.time_s is not None for point in programme.points]
     if any(timed) and not all(timed):
         key = f"programme.points[{timed.index(False)}].time_s"
@@ -188,8 +198,32 @@ def _point_contradictions(programme: ProgrammeTable, file: str) -> list[InputErr
     return found
 
 
+_CHECKS = (
+    _start_contradictions,
+    _point_contradictions,
+    _other_contradictions,
+    _expectation_contradictions,
+)
+"""Mistakes that involve more than one key."""
+
+
+def scenario_of(content: ScenarioFile, text: str, file: str) -> Scenario:
+    """Bring checked content to SI.
+
+    Args:
+        content: The content.
+        text: The TOML text.
+
+    Raises:
+        InputError: Something that shows only when times are worked out.
+    """
+    try:
+        return _scenario(content, text, file)
+    except InputError as error:
+        raise InputError(str(error).rstrip("."), file=file) from error
+
+
 def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
-    """Bring checked content to SI."""
     altitude = DEFAULT_ALTITUDE if content.start.altitude_m is None else content.start.altitude_m
     start = _start(content.start, altitude)
     if content.programme is not None:

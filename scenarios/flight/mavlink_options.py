@@ -17,6 +17,7 @@ from rtsim.sticks.settings import StickSettings
 from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
 from telemetry.mavlink.config import HomePosition, MavlinkConfig, Ratings, endpoints
+from telemetry.mavlink.parameters import ParameterStore
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
@@ -62,7 +63,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         The settings, and a warning to print or None.
 
     Raises:
-        InputError: An address, the key or the stick map is wrong.
+        InputError: An address, the stick map or the file of parameters is wrong.
     """
     targets, host, port, warning = endpoints(options.targets, allow_network=options.allow_network, bind=options.bind)
     stick_map = load_vehicle_map(options.stick_map)
@@ -87,6 +88,8 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         title=scenario.name,
         version=rtsim.__version__,
     )
+    if options.parameter_file:  # what somebody named must be right; an old file of the user's own is only told of
+        ParameterStore(config.aids, config.parameters).load(options.parameter_file)
     return config, warning
 
 

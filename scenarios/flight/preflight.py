@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from rtsim.choices import BUILT_IN_PILOT
-from rtsim.errors import InputError, RtsimError
+from rtsim.errors import InputError, TrimError
 from rtsim.loop.options import declared
 from rtsim.toml_file import parse_toml
 from rtsim.units import to_deg, to_kt
+from scenarios.files.loader import examine_scenario, scenario_of
 from scenarios.files.nacelle_laws import load_nacelle_law
 from scenarios.files.scenario import START_CONDITIONS, Scenario
+from scenarios.files.schema import ScenarioFile, StartTable
 from scenarios.flight.hands import pilot_modes
 from scenarios.flight.mavlink_options import flown_by_hand
 from scenarios.flight.pilots import load_pilot
@@ -55,22 +59,23 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
 
 
 def start_problems(scenario: Scenario) -> list[InputError]:
-    """Whether the aircraft can be trimmed where a scenario starts; an empty list where it can."""
-    start = scenario.start
-    if (start.airspeed, start.nacelle_angle) in START_CONDITIONS.values():
+    """Whether there is an aircraft, and whether it can be trimmed where a scenario starts; empty where it can."""
+    start, own = scenario.start, scenario.options.database
+    if not own and (start.airspeed, start.nacelle_angle) in START_CONDITIONS.values():
         return []
     from rtsim.lpv.aircraft import load_aircraft
 
     try:
-        aircraft = load_aircraft(scenario.options.database or None)
+        aircraft = load_aircraft(own or None)
     except InputError:
         return []  # which preflight_problems tells
     try:
-        trimmed = aircraft.trim(airspeed=start.airspeed, nacelle=start.nacelle_angle).converged
-    except RtsimError:
-        trimmed = False
-    if trimmed:
-        return []
+        if aircraft.trim(airspeed=start.airspeed, nacelle=start.nacelle_angle).converged:
+            return []
+    except TrimError:
+        pass
+    except InputError as error:
+        return [_elsewhere(error, scenario)]
     return [
         InputError(
             "the aircraft has no level-flight trim there",
@@ -80,6 +85,40 @@ def start_problems(scenario: Scenario) -> list[InputError]:
             mend="start inside the conversion corridor (rtsim corridor shows it)",
         )
     ]
+
+
+def _elsewhere(error: InputError, scenario: Scenario) -> InputError:
+    """What is wrong with a start, where it stands."""
+    key = f"start.{error.key}" if error.key else "start"
+    return InputError(
+        error.problem, file=scenario.file, key=key, value=error.value, allowed=error.allowed, mend=error.mend
+    )
+
+
+def every_problem(text: str, *, file: str) -> list[InputError]:
+    """All that would keep the text of a scenario from being flown, in one round.
+
+    Args:
+        text: The TOML text.
+    """
+    try:
+        examined = examine_scenario(text, file=file)
+    except InputError as error:
+        return [error]
+
+    def flown(check: Callable[[Scenario], list[InputError]], content: ScenarioFile) -> list[InputError]:
+        if examined.problems:  # where the flight begins and ends may be among them, and matters to no name
+            changes: dict[str, Any] = {"duration_s": content.duration_s or 1.0}
+            if content.programme is None and content.start.condition is None and content.start.airspeed_kt is None:
+                changes["start"] = StartTable(condition="hover")
+            content = content.model_copy(update=changes)
+        return check(scenario_of(content, text, file))
+
+    try:
+        examined.ask(*(functools.partial(flown, check) for check in (preflight_problems, start_problems)))
+    except InputError as error:  # times that do not add up
+        return [error]
+    return examined.problems
 
 
 def _placed(error: InputError, scenario: Scenario, key: str) -> InputError:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,11 @@ from rtsim.frame import COLUMN, SIGNAL_NAMES, history_sha256
 from rtsim.guests import readable
 from rtsim.loop.options import declared
 from rtsim.loop.simulation import MODES, Simulation
+from rtsim.outside import understanding
 from rtsim.protection.tables import LAW_NAMES
 from scenarios.files.disturbances import DISTURBANCE_KINDS, disturbance_from_event
 from scenarios.flight.flight_setup import setup_from_json, versions
-from telemetry.log.format import LogEvent
+from telemetry.log.format import EVENTS_FILE, LogEvent
 from telemetry.log.reader import FlightLog, read_log
 
 ACTING_KINDS = frozenset({"reset", "pilot", "aid", "flaps", "throttle", "law", "override"})
@@ -115,12 +117,12 @@ def fly_recording(simulation: Simulation, recorded: FloatArray, events: Sequence
     Returns:
         The replayed history, shape (rows flown, SIGNAL_COUNT).
     """
-    acting = [event for event in events if event.kind in {*ACTING_KINDS, *DISTURBANCE_KINDS}]
+    acting = [(_row(event), _action(event)) for event in events if event.kind in {*ACTING_KINDS, *DISTURBANCE_KINDS}]
     replayed = np.empty_like(recorded)
     due = 0
     for row in range(len(recorded)):
-        while due < len(acting) and acting[due].data["row"] <= row:
-            _act(simulation, acting[due])
+        while due < len(acting) and acting[due][0] <= row:
+            acting[due][1](simulation)
             due += 1
         if simulation.finished:
             return replayed[:row]
@@ -163,50 +165,77 @@ def first_difference(recorded: FloatArray, replayed: FloatArray) -> Difference |
     )
 
 
-def _act(simulation: Simulation, event: LogEvent) -> None:
-    if event.kind == "reset":
-        simulation.reset()
-        return
-    if event.kind == "aid":
-        simulation.set_aid(switch_of(str(event.data["aid"])), bool(event.data["on"]))
-        return
-    if event.kind == "flaps":
-        simulation.set_flaps(float(event.data["angle"]))
-        return
-    if event.kind == "throttle":
-        simulation.set_throttle_trim(float(event.data["share"]))
-        return
-    if event.kind == "override":
-        simulation.set_protection_override(bool(event.data["on"]))
-        return
-    if event.kind == "law":
-        _act_on_law(simulation, event)
-        return
-    if event.kind in DISTURBANCE_KINDS:
-        simulation.disturb(disturbance_from_event(event.kind, event.data))
-        return
-    mode = str(event.data["mode"])
-    for name in MODES:
-        if name == mode:
-            simulation.set_pilot(name)
+def _row(event: LogEvent) -> int:
+    """The row before which an event acts."""
+    row = event.data.get("row")
+    if not isinstance(row, int) or row < 0:
+        raise _nonsense(event, f"row is {row!r}")
+    return row
 
 
-def _act_on_law(simulation: Simulation, event: LogEvent) -> None:
-    if simulation.laws is not None and event.data["ended"]:
-        simulation.laws.end(str(event.data["law"]))
-    elif simulation.laws is not None and event.data["what"] == "skipped":
-        simulation.laws.skip(str(event.data["law"]))
+def _action(event: LogEvent) -> Callable[[Simulation], None]:
+    """What an event does to a simulation."""
+    try:
+        return _understood(event.kind, event.data)
+    except InputError as error:
+        raise _nonsense(event, str(error).rstrip(".")) from None
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
+        raise _nonsense(event, f"{type(error).__name__} {error}") from None
+
+
+def _nonsense(event: LogEvent, problem: str) -> InputError:
+    return InputError(
+        f"the event '{event.kind}' at {event.time_s:g} s cannot be repeated: {problem}",
+        file=EVENTS_FILE,
+        mend="restore the file, or record the flight again",
+    )
+
+
+def _understood(kind: str, data: Mapping[str, Any]) -> Callable[[Simulation], None]:
+    if kind == "reset":
+        return Simulation.reset
+    if kind == "aid":
+        aid, on = switch_of(str(data["aid"])), bool(data["on"])
+        return lambda simulation: simulation.set_aid(aid, on)
+    if kind == "flaps":
+        angle = _number(data["angle"])
+        return lambda simulation: simulation.set_flaps(angle)
+    if kind == "throttle":
+        share = _number(data["share"])
+        return lambda simulation: simulation.set_throttle_trim(share)
+    if kind == "override":
+        active = bool(data["on"])
+        return lambda simulation: simulation.set_protection_override(active)
+    if kind == "law":
+        return _action_on_law(str(data["law"]), ended=bool(data["ended"]), what=str(data.get("what")))
+    if kind in DISTURBANCE_KINDS:
+        disturbance = disturbance_from_event(kind, data)
+        return lambda simulation: simulation.disturb(disturbance)
+    mode = next((name for name in MODES if name == data["mode"]), None)
+    return lambda simulation: None if mode is None else simulation.set_pilot(mode)
+
+
+def _number(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("is no finite number")
+    return number
+
+
+def _action_on_law(law: str, *, ended: bool, what: str) -> Callable[[Simulation], None]:
+    def act(simulation: Simulation) -> None:
+        if simulation.laws is not None and ended:
+            simulation.laws.end(law)
+        elif simulation.laws is not None and what == "skipped":
+            simulation.laws.skip(law)
+
+    return act
 
 
 def _setup(log: FlightLog) -> Any:
-    try:
+    mend = f"replay it with the version that wrote it ({log.metadata.versions.get('rtsim', 'unknown')})"
+    with understanding("account of how the log was flown", file=log.path, mend=mend):
         setup = setup_from_json(log.metadata.setup["flight"])
-    except (KeyError, TypeError) as error:
-        raise InputError(
-            f"does not say how it was flown ({error})",
-            file=str(log.path),
-            mend=f"replay it with the version that wrote it ({log.metadata.versions.get('rtsim', 'unknown')})",
-        ) from None
     # A log that travels takes the files that it names along, beside it.
     named = {item.name: Path(getattr(setup.options, item.name)).name for item in declared().values() if item.is_file}
     there = {

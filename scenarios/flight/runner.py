@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rtsim.arguments import instance
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
 from rtsim.frame import history_sha256
@@ -98,12 +99,9 @@ def fly(
         InputError: If something that was asked for does not exist or cannot be flown.
         OutputError: If a log or recording cannot be started.
     """
-    if not isinstance(scenario, Scenario):
-        scenario = load_scenario(scenario)
-    if overrides is not None:
-        scenario = with_overrides(scenario, overrides)
-    for problem in preflight_problems(scenario):
-        raise problem
+    if outputs is not None:
+        instance(outputs, FlightOutputs, "outputs", "give FlightOutputs(log=...)")
+    scenario = _chosen(scenario, overrides)
     if speed != "max":
         checked_speed(speed)
     policy = OverrunPolicy.parse(overrun_policy)
@@ -166,6 +164,18 @@ def fly(
         raise
     link_failure = _close_mavlink(link)
     return dataclasses.replace(record, failure=_close(log, view, record) or link_failure)
+
+
+def _chosen(scenario: str | Path | Scenario, overrides: Overrides | None) -> Scenario:
+    """The scenario with what was changed of it; all that it names is there."""
+    if not isinstance(scenario, Scenario):
+        scenario = load_scenario(scenario)
+    if overrides is not None:
+        instance(overrides, Overrides, "overrides", "give Overrides(duration=...)")
+        scenario = with_overrides(scenario, overrides)
+    for problem in preflight_problems(scenario):
+        raise problem
+    return scenario
 
 
 def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:

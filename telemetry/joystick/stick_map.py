@@ -13,10 +13,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from rtsim.errors import InputError
-from rtsim.strict import Strict, checked
+from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml, shipped_names
 
-_LIBRARY = "telemetry/joystick/maps"
+LIBRARY = "telemetry/joystick/maps"
+"""Where the maps lie that come with rtsim."""
 _Part = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
 _DeadBand = Annotated[float, Field(ge=0.0, le=0.3, allow_inf_nan=False)]
 _ManualAxis = Annotated[str, Field(pattern=r"^(-?(x|y|z|r|s|t|aux[1-6]))?$")]
@@ -138,7 +139,7 @@ StickMap = VehicleMap | GamepadMap
 
 def map_names() -> list[str]:
     """Names of the maps that come with rtsim, sorted."""
-    return shipped_names(_LIBRARY)
+    return shipped_names(LIBRARY)
 
 
 def load_stick_map(name_or_path: str | Path) -> StickMap:
@@ -150,7 +151,7 @@ def load_stick_map(name_or_path: str | Path) -> StickMap:
     Raises:
         InputError: It does not exist or is wrong; the first mistake is told.
     """
-    text, file = named_text(name_or_path, folder=_LIBRARY, noun="stick map", key="--map")
+    text, file = named_text(name_or_path, folder=LIBRARY, noun="stick map", key="--map")
     return parse_stick_map(text, file=file)
 
 
@@ -216,20 +217,41 @@ def parse_stick_map(text: str, *, file: str) -> StickMap:
     Raises:
         InputError: For the first mistake found.
     """
-    data = parse_toml(text, file=file)
-    kind = data.get("kind")
-    models: dict[Any, type[StickMap]] = {"vehicle": VehicleMap, "gamepad": GamepadMap}
-    if not isinstance(kind, str) or kind not in models:
-        raise InputError(
-            "is no kind of stick map", file=file, key="kind", value=kind, allowed="vehicle, gamepad", mend="choose one"
-        )
-    found = checked(models[kind], data, file=file)
-    _refuse_shared(found, file)
+    found, problems = examine_stick_map(parse_toml(text, file=file), file=file)
+    for problem in problems:
+        raise problem
     return found
 
 
-def _refuse_shared(found: StickMap, file: str) -> None:
-    """Refuse an axis or a button that has two things to do: neither would work."""
+def examine_stick_map(data: dict[str, Any], *, file: str) -> tuple[StickMap, list[InputError]]:
+    """Find every mistake of a map.
+
+    Args:
+        data: Its tables.
+
+    Returns:
+        The map as far as it can be understood, and the mistakes.
+    """
+    kind = data.get("kind")
+    models: dict[Any, type[StickMap]] = {"vehicle": VehicleMap, "gamepad": GamepadMap}
+    problems = []
+    if not isinstance(kind, str) or kind not in models:
+        mend = "choose one"
+        problems.append(
+            InputError(
+                "is no kind of stick map", file=file, key="kind", value=kind, allowed="vehicle, gamepad", mend=mend
+            )
+        )
+        kind = "gamepad" if {"match", "hat_buttons"} & set(data) else "vehicle"
+        data = {**data, "kind": kind}
+    examined: Examined[Any] = Examined(models[kind], data, file=file)
+    examined.ask(lambda content: _shared(content, file))
+    return examined.content, problems + examined.problems
+
+
+def _shared(found: StickMap, file: str) -> list[InputError]:
+    """Axes and buttons that have two things to do: neither would work."""
+    problems = []
     if isinstance(found, VehicleMap):
         from telemetry.mavlink.pilot_input import STANDARD_AXES, STANDARD_BUTTONS
 
@@ -245,9 +267,9 @@ def _refuse_shared(found: StickMap, file: str) -> None:
             other = first.setdefault(place, key)
             if other != key:
                 mend = f"move {table}.{other} or {table}.{key}"
-                raise InputError(
-                    f"is used by {table}.{other} too", file=file, key=f"{table}.{key}", value=place, mend=mend
-                )
+                problem = f"is used by {table}.{other} too"
+                problems.append(InputError(problem, file=file, key=f"{table}.{key}", value=place, mend=mend))
+    return problems
 
 
 def _wrong_kind(name: object, wanted: str, command: str) -> InputError:

@@ -7,6 +7,7 @@ events, one JSON object a line; readers of Parquet data sets pass over names tha
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -74,10 +75,12 @@ class FlightMetadata:
 
         Args:
             text: The JSON object.
+
+        Raises:
+            ValueError: It is none, or a value is missing or of another type.
         """
-        values = json.loads(text)
-        outline = values.pop("corridor")
-        return cls(**values, corridor=CorridorOutline.from_dict(outline) if outline else None)
+        found: FlightMetadata = _checked(cls, text)
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +110,12 @@ class LogEvent:
 
         Args:
             line: One line of ``_events.jsonl``.
+
+        Raises:
+            ValueError: It is no JSON, or a value is missing or of another type.
         """
-        return cls(**json.loads(line))
+        found: LogEvent = _checked(cls, line)
+        return found
 
 
 def log_schema(metadata_json: str | None, summary: Mapping[str, Any] | None = None) -> pa.Schema:
@@ -147,6 +154,18 @@ def read_schema_metadata(raw: Mapping[bytes, bytes] | None) -> dict[str, str]:
     """
     entries = {key.decode(): value.decode() for key, value in (raw or {}).items()}
     return {key.removeprefix(_KEY): value for key, value in entries.items() if key.startswith(_KEY)}
+
+
+def _checked(kind: Any, text: str) -> Any:
+    """A dataclass from JSON, its types checked."""
+    return _adapter(kind).validate_python(json.loads(text))
+
+
+@functools.cache
+def _adapter(kind: Any) -> Any:
+    from pydantic import TypeAdapter  # the writer's process does without
+
+    return TypeAdapter(kind)
 
 
 def _text(value: object) -> str:

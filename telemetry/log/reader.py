@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_NAMES, history_sha256
+from rtsim.outside import named, opening, read_text, regular_file, understanding
 from telemetry.log.format import (
     EVENTS_FILE,
-    HEADER_PART,
     LOG_VERSION,
     FlightMetadata,
     LogEvent,
+    part_name,
     read_schema_metadata,
 )
+
+PART_NAME = re.compile(r"part-[0-9]{6,}\.parquet")
+"""Names of a log's parts; whatever else lies in its folder is not the log's."""
+_LARGEST_PART = 100_000_000
+"""Size of the largest part that is read, and of its largest column [bytes]; a second of flight has about 0.2 MB."""
+_MOST_ROWS, _MOST_COLUMNS = 100_000, 1000
+_LARGEST_EVENTS = 500_000_000
+_MEND = "fly it again, or restore the file"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +111,7 @@ class FlightLog:
 
 
 def read_log(path: str | os.PathLike[str]) -> FlightLog:
-    """Read a flight log, finished or not.
+    """Read a flight log, finished or not; files in its folder that are none of its parts are passed over.
 
     Args:
         path: The log's directory.
@@ -109,17 +122,11 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
     Raises:
         InputError: There is no log, or it is none of rtsim, or one of its files is damaged.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    directory = Path(path)
-    _check_is_log(directory)
-    try:
-        entries = read_schema_metadata(pq.read_schema(directory / HEADER_PART).metadata)
-        table = pq.read_table(directory)
-    except (OSError, pa.ArrowException) as failure:
-        raise InputError(f"the log is damaged: {failure}", file=str(directory)) from failure
-    if int(entries.get("log_version", "0")) != LOG_VERSION:
+    directory = named(path)
+    parts = _parts(directory)
+    header, *others = parts
+    entries, names, _ = _read_part(header)
+    if entries.get("log_version", "0") != str(LOG_VERSION):
         raise InputError(
             "this version of rtsim reads logs of another layout only",
             file=str(directory),
@@ -127,38 +134,78 @@ def read_log(path: str | os.PathLike[str]) -> FlightLog:
             value=entries.get("log_version"),
             allowed=str(LOG_VERSION),
         )
-    rows = np.empty((table.num_rows, table.num_columns))
-    for column in range(table.num_columns):
-        rows[:, column] = table.column(column).to_numpy()
+    with understanding("header of a flight log", file=header, mend=_MEND):
+        units = TypeAdapter(tuple[str, ...]).validate_json(entries["units"])
+        metadata = FlightMetadata.from_json(entries["metadata"])
+        summary = TypeAdapter(dict[str, Any]).validate_python(json.loads(entries.get("summary", "{}")))
+        if len(units) != len(names) or not 0.0 < metadata.rate_hz < math.inf:
+            raise ValueError("units, columns or rate are nonsense")
+    blocks = []
+    for part in others:
+        _, columns, rows = _read_part(part)
+        if columns != names:
+            raise InputError("holds other columns than the log's first part", file=str(part), mend=_MEND)
+        blocks.append(rows)
+    rows = np.concatenate([*blocks, np.empty((0, len(names)))])
     rows.setflags(write=False)
     return FlightLog(
         path=directory,
-        names=tuple(table.column_names),
-        units=tuple(json.loads(entries["units"])),
+        names=names,
+        units=units,
         rows=rows,
-        metadata=FlightMetadata.from_json(entries["metadata"]),
+        metadata=metadata,
         events=_read_events(directory / EVENTS_FILE),
-        summary=json.loads(entries["summary"]) if "summary" in entries else None,
+        summary=summary if "summary" in entries else None,
     )
 
 
-def _check_is_log(directory: Path) -> None:
+def _parts(directory: Path) -> list[Path]:
+    """The parts of a log in order, the header first."""
     where = str(directory)
-    if not directory.exists():
-        raise InputError("there is no such log", file=where, mend="check the path, or record one with rtsim fly --log")
-    if not directory.is_dir():
-        raise InputError("this is a file; a flight log is a directory", file=where, mend="name the log's directory")
+    with opening(directory, "check the path, or record one with rtsim fly --log"):
+        status = directory.stat()
+        if not stat.S_ISDIR(status.st_mode):
+            raise InputError("this is a file; a flight log is a directory", file=where, mend="name the log's directory")
+        found = sorted(entry for entry in directory.iterdir() if PART_NAME.fullmatch(entry.name))
     if not (directory / EVENTS_FILE).is_file():
         raise InputError("this is no flight log of rtsim", file=where, mend="record one with rtsim fly --log")
-    if not (directory / HEADER_PART).is_file():
+    for number, part in enumerate(found):
+        if part.name != part_name(number):
+            mend = "restore it, or fly it again"
+            raise InputError(
+                "is missing between the parts of the log", file=str(directory / part_name(number)), mend=mend
+            )
+    if not found:
         raise InputError("the recording was cut off before its first part was written", file=where, mend="fly it again")
+    return found
+
+
+def _read_part(path: Path) -> tuple[dict[str, str], tuple[str, ...], FloatArray]:
+    """The log's own entries, names of the columns, and rows of one part."""
+    import pyarrow.parquet as pq
+
+    regular_file(path, noun="part of a flight log", largest=_LARGEST_PART, missing=_MEND)
+    with understanding("part of a flight log", file=path, mend=_MEND), pq.ParquetFile(path) as part:
+        table = part.metadata
+        if table.num_rows > _MOST_ROWS or table.num_columns > _MOST_COLUMNS:
+            raise ValueError(f"{table.num_rows} rows and {table.num_columns} columns are too many")
+        for group in range(table.num_row_groups):
+            sizes = table.row_group(group)
+            if any(sizes.column(k).total_uncompressed_size > _LARGEST_PART for k in range(sizes.num_columns)):
+                raise ValueError("a column is too large")
+        content = part.read(use_threads=False)
+        rows = np.empty((content.num_rows, content.num_columns))
+        for column in range(content.num_columns):
+            rows[:, column] = content.column(column).to_numpy()
+        return read_schema_metadata(content.schema.metadata), tuple(content.column_names), rows
 
 
 def _read_events(path: Path) -> tuple[LogEvent, ...]:
     """The events; a last line that a kill cut off is left out."""
-    lines = path.read_text(encoding="utf-8").split("\n")
-    whole = lines[:-1]  # what follows the last newline is either nothing or a line that was cut off
-    try:
-        return tuple(LogEvent.from_json(line) for line in whole if line)
-    except (ValueError, TypeError) as failure:
-        raise InputError(f"an event cannot be read: {failure}", file=str(path)) from failure
+    lines = read_text(path, noun="list of events", largest=_LARGEST_EVENTS, may_be_empty=True).split("\n")
+    events = []
+    for number, line in enumerate(lines[:-1]):  # what follows the last newline is nothing, or a line that was cut off
+        if line:
+            with understanding("event", file=f"{path}: line {number + 1}", mend="correct or delete this line"):
+                events.append(LogEvent.from_json(line))
+    return tuple(events)

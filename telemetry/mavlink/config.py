@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from rtsim.errors import InputError
+from rtsim.outside import read_bytes
 
 DEFAULT_TARGET = "127.0.0.1:14550"
 """Where ground stations listen by convention."""
@@ -207,14 +208,8 @@ def read_signing_key(path: str | Path) -> bytes:
         InputError: The file is missing, open to others, or holds no key.
     """
     file = Path(path)
-    try:
-        mode = file.stat().st_mode
-        data = file.read_bytes()[:4096]
-    except OSError as failure:
-        raise InputError(
-            f"the signing key cannot be read ({failure.strerror})", key="--mavlink-key", value=str(path)
-        ) from None
-    if mode & 0o077:
+    data = read_bytes(file, noun="signing key", largest=4096)
+    if file.stat().st_mode & 0o077:
         raise InputError(
             "the signing key can be read by others", key="--mavlink-key", value=str(path), mend=f"run chmod 600 {path}"
         )

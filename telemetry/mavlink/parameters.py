@@ -176,15 +176,34 @@ class ParameterStore:
         """
         if not Path(path).exists():
             return
-        values = read_toml(Path(path), noun="parameter")
+        values = read_toml(Path(path), noun="parameter", may_be_empty=True)
         before = list(self._values)
+        for problem in self.problems(values, file=str(path)):
+            self._values = before
+            raise problem
+
+    @classmethod
+    def every_aid(cls) -> ParameterStore:
+        """The parameters of a vehicle that has every pilot aid there may be."""
+        return cls(dict.fromkeys(AID_PARAMETERS, False), {})
+
+    def problems(self, values: Mapping[str, object], *, file: str) -> list[InputError]:
+        """Take stored values.
+
+        Args:
+            values: Values by name.
+
+        Returns:
+            Why some were not taken.
+        """
+        found = []
         for name, value in values.items():
             if name in self.index and not self.declared[self.index[name]].stored:
                 continue
             number = float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else math.nan
             if self.set(name, number) is None:
-                self._values = before
-                raise self._refusal(name, value, file=str(path))
+                found.append(self._refusal(name, value, file=file))
+        return found
 
     def _refusal(self, name: str, value: object, *, file: str | None = None) -> InputError:
         if name not in self.index:

@@ -94,5 +94,5 @@ def test_what_is_no_log_is_one_sentence(
     assert code == EXIT_BAD_INPUT
     assert out == ""
     assert err.startswith("rtsim: error:")
-    assert "no such log" in err
+    assert "does not exist" in err
     assert "Traceback" not in err

@@ -88,13 +88,13 @@ def test_no_trim_is_exit_two_with_a_sentence(capsys):
         (("trim", *at(50, 120)), ["--nacelle-deg", "0 to 95 deg"]),
         (("trim", *at(300, 10)), ["airspeed: outside the database", "300 kn", "-20 to 260 kn"]),
         (("trim", *at(50, 80), "--weight-lb", "100"), ["--weight-lb", "5000 to 20000 lb"]),
-        (("trim", *at(50, 80), "--database", "absent.nc"), ["absent.nc", "no such database file"]),
+        (("trim", *at(50, 80), "--database", "absent.nc"), ["absent.nc", "does not exist"]),
         (("linearize", *at(50, 80), "--closed-loop", "--nonlinear"), ["--closed-loop", "leave out"]),
         (("linearize", *at(50, 80), "--closed-loop", "--outer-loop", "lqg"), ["--outer-loop", "integrators, pi"]),
         (("linearize", *at(50, 80), "--outer-loop", "lqg"), ["--outer-loop", "integrators, pi", "choose one"]),
         (("model", "export", "out.txt"), ["out.txt", ".nc or .mat"]),
-        (("model", "import", "absent.mat"), ["absent.mat", "no such database file"]),
-        (("model", "info", "absent.nc"), ["absent.nc", "no such database file"]),
+        (("model", "import", "absent.mat"), ["absent.mat", "does not exist"]),
+        (("model", "info", "absent.nc"), ["absent.nc", "does not exist"]),
     ],
 )
 def test_bad_input_is_one_clear_sentence(capsys, arguments, words):

@@ -89,7 +89,7 @@ def test_a_database_without_pilots_says_how_to_design_them(files: Path, capsys: 
     assert run([*fly, str(files / "without_pilot.nc")]) == 2
     assert "--design-pilots" in " ".join(capsys.readouterr().err.split())
     assert run([*fly, str(files / "missing.nc")]) == 2
-    assert "no such database file" in " ".join(capsys.readouterr().err.split())
+    assert "does not exist" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.slow

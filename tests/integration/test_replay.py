@@ -142,7 +142,7 @@ def test_a_cut_off_log_is_replayed_as_far_as_it_goes(tmp_path: Path, capsys: pyt
 
 
 def test_what_is_no_log_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such log"):
+    with pytest.raises(InputError, match="does not exist"):
         replay_log(tmp_path / "none.parquet")
     assert run(["replay", str(tmp_path)]) == 2
 

@@ -37,7 +37,7 @@ def test_an_unknown_signal_is_answered_with_the_known_ones(log: FlightLog) -> No
 
 
 def test_what_is_no_log_is_named(tmp_path: Path, log: FlightLog) -> None:
-    with pytest.raises(InputError, match="no such log"):
+    with pytest.raises(InputError, match=r"does not exist.*record one with rtsim fly --log"):
         read_log(tmp_path / "nothing")
     file = tmp_path / "file.parquet"
     pq.write_table(pa.table({"a": [1]}), file)
@@ -68,7 +68,7 @@ def test_a_last_event_that_was_cut_off_is_left_out(log: FlightLog) -> None:
     events.write_text(events.read_text() + '{"frame": 3, "time_')
     assert [event.kind for event in read_log(log.path).events] == ["start"]
     events.write_text('{"frame": 3}\n' + events.read_text())
-    with pytest.raises(InputError, match="an event cannot be read"):
+    with pytest.raises(InputError, match=r"_events\.jsonl: line 1: is damaged, or no event"):
         read_log(log.path)
 
 

@@ -236,7 +236,7 @@ def test_signing_keys_are_read_from_private_files(tmp_path):
     file.write_text("too short")
     with pytest.raises(InputError, match="64 hexadecimal"):
         read_signing_key(file)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="does not exist"):
         read_signing_key(tmp_path / "none")
 
 

@@ -54,7 +54,8 @@ def test_refusal(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "holds no design problem"),
+        ("", "is empty"),
+        ("# nothing", "holds no design problem"),
         ("case = 3", "is not a table"),
         ("[case.a]", "has no input"),
         ("[case.a.input]\nA = [[1.0]", "is not valid TOML"),

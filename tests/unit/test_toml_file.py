@@ -27,7 +27,7 @@ READERS = (load_scenario, load_campaign, load_spec, load_cases, read_profile, lo
     [
         (None, "does not exist; check the path"),
         (b"a = ", r"is not valid TOML: invalid value \(at (line 1|end of document).*; correct this line"),
-        (b"a = \xff", r"is not a text file \(byte 4 is not UTF-8\); save it as UTF-8"),
+        (b"a = \xff", r"is not a text file \(line 1: byte 4 is not UTF-8\); save it as UTF-8"),
         (b"a = " + b"[" * 50_000, "is nested too deeply; write flat tables"),
         (b"#" * 4_000_001, "is too large for a .*; allowed: at most [14]000000 bytes"),
     ],

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 
 from rtsim.aircraft.variables import Variable
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.lpv.cells import fill_invalid
 from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.sanity import check_meaning, check_units
 
 OPTIONAL: Final = ("valid", "xdot_ref", "df_dnacelle", "flap", "rotor_speed")
 """Arrays that a user's own database may leave out: all cells valid, unaccelerated, and the rest zero."""
+LARGEST_FILE: Final = 500_000_000
+"""Size of the largest database file that is read [bytes]."""
+LARGEST_CONTENT: Final = 1_000_000_000
+"""Size of the largest database, unpacked [bytes]."""
+REDESIGN: Final = "design the pilots anew (rtsim model import FILE --design-pilots)"
+"""What to do about gains that mean nothing."""
 KINDS: Final = ("state", "input", "output")
 """The three lists of variables."""
 
@@ -25,6 +34,7 @@ def assemble_database(
     attributes: Mapping[str, str | float | int],
     pilot: Mapping[str, PilotArrays],
     file: str,
+    units: Mapping[str, str] = MappingProxyType({}),
 ) -> Database:
     """Build a database from what a file holds; fills cells without a trim.
 
@@ -33,6 +43,7 @@ def assemble_database(
         variables: States, inputs and outputs under ``state``, ``input`` and ``output``.
         attributes: Attributes of the file.
         pilot: Pilot gains by name of the design.
+        units: Units of axes and configuration, where the file says them.
 
     Returns:
         The checked database.
@@ -44,17 +55,23 @@ def assemble_database(
     for name in (*AXES, *GRIDDED, "flap", "rotor_speed"):
         if name not in values and name not in OPTIONAL:
             raise InputError("the array is missing", file=file, key=name, mend="see docs/lpv.md for the layout")
-    _complete(values)
-    values["rotor_speed"] = float(np.asarray(values["rotor_speed"]).reshape(-1)[0])
     for name, array in values.items():
-        if name != "rotor_speed":
-            values[name] = _as_array(name, array, file)
+        values[name] = _as_array(name, array, file)
+    _complete(values)
+    if values["rotor_speed"].size != 1:
+        raise InputError("is not one number", file=file, key="rotor_speed", mend="give the rotor speed that is held")
+    values["rotor_speed"] = values["rotor_speed"].item()
+    for design, stored in pilot.items():
+        for name, array in stored.arrays.items():
+            if not np.all(np.isfinite(array)):
+                raise InputError("not a finite number", file=file, key=f"pilot/{design}/{name}", mend=REDESIGN)
     try:
         _fill(values)
         for array in values.values():
             if isinstance(array, np.ndarray):
                 array.setflags(write=False)  # ours alone: the database need not copy it again
-        return Database(
+        check_units(units)
+        database = Database(
             **values,
             states=tuple(variables["state"]),
             inputs=tuple(variables["input"]),
@@ -62,6 +79,8 @@ def assemble_database(
             attributes=attributes,
             pilot=pilot,
         )
+        check_meaning(database)
+        return database
     except InputError as error:
         raise InputError(str(error).rstrip("."), file=file) from error
 
@@ -74,16 +93,33 @@ def _complete(values: dict[str, Any]) -> None:
     values.setdefault("xdot_ref", np.zeros_like(x_ref))
     values.setdefault("df_dnacelle", np.zeros_like(x_ref))
     values.setdefault("flap", np.zeros(grid[1:]))
-    values.setdefault("rotor_speed", 0.0)
+    values.setdefault("rotor_speed", np.array(0.0))
+
+
+def real_array(name: str, value: Any, file: str) -> FloatArray:
+    """A read-only array of float64 from what a file holds.
+
+    Args:
+        name: Its name in the file.
+        value: What the file holds.
+
+    Raises:
+        InputError: It is not made of real numbers.
+    """
+    array = _as_array(name, value, file)
+    array.setflags(write=False)
+    return np.ascontiguousarray(array)
 
 
 def _as_array(name: str, value: Any, file: str) -> Any:
+    if np.iscomplexobj(value):
+        raise InputError("holds complex numbers", file=file, key=name, mend="give real numbers")
     try:
         if name != "valid":
             return np.array(value, dtype=np.float64)
         flags = np.array(value)
         if flags.dtype != np.bool_ and not np.all(np.isin(flags, (0, 1))):
-            raise InputError("neither 0 nor 1", file=file, key=name)
+            raise InputError("neither 0 nor 1", file=file, key=name, mend="mark cells that have a trim with 1")
         return flags.astype(np.bool_)
     except (TypeError, ValueError) as error:
         raise InputError("not an array of numbers", file=file, key=name, value=str(error)) from error

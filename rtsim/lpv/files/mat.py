@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,9 @@ import numpy as np
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
 from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
-from rtsim.lpv.files.assemble import KINDS, assemble_database
+from rtsim.lpv.files.assemble import KINDS, LARGEST_CONTENT, LARGEST_FILE, assemble_database, real_array
+from rtsim.lpv.files.mat_layout import unpacked
+from rtsim.outside import read_bytes, regular_file, understanding
 from rtsim.whole_file import whole_file
 
 _DIMENSIONS = {"x_ref": 4, "u_ref": 4, "y_ref": 4, "xdot_ref": 4, "df_dnacelle": 4, "valid": 3, "flap": 2,
@@ -34,27 +37,23 @@ def read_mat(path: str | Path) -> Database:
     """
     from scipy.io import loadmat
 
-    file = Path(path)
-    if not file.is_file():
-        raise InputError("no such database file", file=str(file), mend="check the path")
-    try:
-        content = loadmat(str(file), squeeze_me=False, struct_as_record=True)
-    except NotImplementedError as error:
-        raise InputError("a MATLAB 7.3 file", file=str(file), mend="save it with the option '-v7'") from error
-    except (ValueError, TypeError, OSError, KeyError) as error:
-        raise InputError("not a readable MATLAB file", file=str(file), value=str(error)) from error
-    arrays: dict[str, Any] = {}
-    for name in (*AXES, *GRIDDED, "flap", "rotor_speed"):
-        if name in content:
-            arrays[name] = _reshaped(name, content[name])
-    variables = {kind: _variables(content, kind, str(file)) for kind in KINDS}
-    return assemble_database(
-        arrays,
-        variables,
-        attributes=_attributes(content.get("attributes")),
-        pilot=_pilots(content.get("pilot")),
-        file=str(file),
-    )
+    file = regular_file(path, noun="database", largest=LARGEST_FILE, missing="check the path")
+    data = read_bytes(file, noun="database", largest=LARGEST_FILE)
+    if b"\x89HDF" in data[:1024]:
+        raise InputError("a MATLAB 7.3 file", file=str(file), mend="save it with the option '-v7'")
+    with understanding("MATLAB database", file=file, mend="save it anew with the option '-v7'"):
+        content = loadmat(io.BytesIO(unpacked(data, largest=LARGEST_CONTENT)), struct_as_record=True)
+        arrays: dict[str, Any] = {}
+        for name in (*AXES, *GRIDDED, "flap", "rotor_speed"):
+            if name in content:
+                arrays[name] = _reshaped(name, content[name])
+        return assemble_database(
+            arrays,
+            {kind: _variables(content, kind, str(file)) for kind in KINDS},
+            attributes=_attributes(content.get("attributes")),
+            pilot=_pilots(content.get("pilot"), str(file)),
+            file=str(file),
+        )
 
 
 def write_mat(database: Database, path: str | Path) -> None:
@@ -130,20 +129,16 @@ def _attributes(value: Any) -> dict[str, str | float | int]:
     attributes: dict[str, str | float | int] = {}
     for name, entry in _record(value).items():
         cell = np.asarray(entry)
-        if name != "content_hash" and cell.size == 1:
+        if name != "content_hash" and cell.size == 1 and cell.dtype.kind in "fiubU":
             attributes[name] = cell.reshape(-1)[0].item()
     return attributes
 
 
-def _pilots(value: Any) -> dict[str, PilotArrays]:
+def _pilots(value: Any, file: str) -> dict[str, PilotArrays]:
     pilots = {}
     for design, record in _record(value).items():
         parts = _record(record)
         attributes = _attributes(parts.pop("attributes", None))
-        arrays = {}
-        for name, entry in parts.items():
-            array = np.array(entry, dtype=np.float64)
-            array.setflags(write=False)
-            arrays[name] = array
+        arrays = {name: real_array(f"pilot.{design}.{name}", entry, file) for name, entry in parts.items()}
         pilots[design] = PilotArrays(arrays, attributes)
     return pilots

@@ -6,6 +6,9 @@ A file is written beside its target and renamed, so a reader never meets half of
 
 from __future__ import annotations
 
+import math
+import subprocess
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +19,10 @@ import numpy.typing as npt
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
 from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
-from rtsim.lpv.files.assemble import KINDS, assemble_database
+from rtsim.lpv.files import netcdf_trial
+from rtsim.lpv.files.assemble import KINDS, LARGEST_CONTENT, LARGEST_FILE, assemble_database, real_array
+from rtsim.lpv.sanity import AXIS_UNITS
+from rtsim.outside import regular_file, understanding
 from rtsim.whole_file import whole_file
 
 SHIPPED: Final = Path(__file__).parents[2] / "aircraft" / "xv15" / "data" / "xv15_lpv.nc"
@@ -65,18 +71,37 @@ def read_database(path: str | Path | None = None) -> Database:
     Raises:
         InputError: The file is missing, no NetCDF file, or not a database the kernels could fly.
     """
-    file = Path(path) if path is not None else SHIPPED
-    if not file.is_file():
-        mend = "run 'rtsim model build'" if path is None else "check the path"
-        raise InputError("no such database file", file=str(file), mend=mend)
+    missing = "run 'rtsim model build'" if path is None else "check the path"
+    file = regular_file(SHIPPED if path is None else path, noun="database", largest=LARGEST_FILE, missing=missing)
     import netCDF4
 
-    try:
-        with netCDF4.Dataset(str(file), "r") as dataset:
-            dataset.set_auto_mask(False)
-            return _read(dataset, str(file))
-    except OSError as error:
-        raise InputError("not a readable NetCDF file", file=str(file), value=str(error)) from error
+    mend = "write it anew (docs/lpv.md), or restore it"
+    if file != SHIPPED:
+        _try(file, mend)
+    with understanding("NetCDF database", file=file, mend=mend), netCDF4.Dataset(str(file), "r") as dataset:
+        dataset.set_auto_mask(False)
+        _measure(dataset)
+        return _read(dataset, str(file))
+
+
+def _try(file: Path, mend: str) -> None:
+    """Have another process read a file first: given a damaged one the library may loop for ever, or crash."""
+    command = [sys.executable, "-P", str(Path(netcdf_trial.__file__)), str(file.resolve())]
+    ended = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    if ended.returncode:
+        lines = ended.stderr.decode(errors="replace").split("\n") if ended.returncode == 1 else []
+        with understanding("NetCDF database", file=file, mend=mend):
+            raise ValueError(next((line for line in reversed(lines) if line), "reading it does not end, or crashes"))
+
+
+def _measure(dataset: Any) -> None:
+    """Refuse what would take more memory than any database: a damaged file says anything of its sizes."""
+    groups = [dataset, *(dataset.groups["pilot"].groups.values() if "pilot" in dataset.groups else ())]
+    sizes = [
+        math.prod(int(length) for length in variable.shape) for group in groups for variable in group.variables.values()
+    ]
+    if 8 * sum(sizes) > LARGEST_CONTENT:
+        raise ValueError(f"it holds more than {LARGEST_CONTENT} bytes")
 
 
 def write_database(database: Database, path: str | Path) -> None:
@@ -164,8 +189,13 @@ def _read(dataset: Any, file: str) -> Database:
         arrays,
         {kind: _read_variables(dataset, kind, file) for kind in KINDS},
         attributes=attributes,
-        pilot=_read_pilots(dataset),
+        pilot=_read_pilots(dataset, file),
         file=file,
+        units={
+            name: str(dataset.variables[name].getncattr("units"))
+            for name in AXIS_UNITS
+            if name in dataset.variables and "units" in dataset.variables[name].ncattrs()
+        },
     )
     if stored is not None and stored != database.content_hash:
         raise InputError(
@@ -189,16 +219,15 @@ def _read_variables(dataset: Any, kind: str, file: str) -> tuple[Variable, ...]:
     return tuple(Variable(*row) for row in zip(*columns, strict=True))
 
 
-def _read_pilots(dataset: Any) -> dict[str, PilotArrays]:
+def _read_pilots(dataset: Any, file: str) -> dict[str, PilotArrays]:
     if "pilot" not in dataset.groups:
         return {}
     pilots = {}
     for design, group in dataset.groups["pilot"].groups.items():
-        arrays = {}
-        for name, variable in group.variables.items():
-            array = np.ascontiguousarray(variable[...], dtype=np.float64)
-            array.setflags(write=False)
-            arrays[name] = array
+        arrays = {
+            name: real_array(f"pilot/{design}/{name}", variable[...], file)
+            for name, variable in group.variables.items()
+        }
         pilots[design] = PilotArrays(arrays, {key: _plain(group.getncattr(key)) for key in group.ncattrs()})
     return pilots
 

@@ -18,8 +18,10 @@ from rtsim.aircraft.profile import (
 )
 from rtsim.kernels.kept import kept
 from rtsim.lpv.database import Database
+from rtsim.lpv.files.assemble import LARGEST_FILE
 from rtsim.lpv.files.mat import read_mat, write_mat
 from rtsim.lpv.files.netcdf import SHIPPED, read_database, write_database
+from rtsim.outside import regular_file
 
 
 def load_database(path: str | Path | None = None) -> Database:
@@ -36,15 +38,20 @@ def load_database(path: str | Path | None = None) -> Database:
     Raises:
         InputError: The file is missing, not readable, or not a database the kernels could fly.
     """
-    file = SHIPPED if path is None else Path(path)
-    if not file.is_file():
-        return _read(file, None)
+    missing = "run 'rtsim model build'" if path is None else "check the path"
+    file = regular_file(SHIPPED if path is None else path, noun="database", largest=LARGEST_FILE, missing=missing)
     beside = file.with_name(file.stem + OWN_SUFFIX)
-    return _read_once(file, file.stat().st_mtime_ns, beside, beside.stat().st_mtime_ns if beside.is_file() else None)
+    return _read_once(file, _state(file), beside, _state(beside) if beside.exists() else None)
+
+
+def _state(file: Path) -> str:
+    """What changes with a file."""
+    stat = file.stat()
+    return f"{stat.st_ino} {stat.st_size} {stat.st_mtime_ns} {stat.st_ctime_ns}"
 
 
 @functools.lru_cache(maxsize=4)
-def _read_once(file: Path, _modified: int, beside: Path, profile_modified: int | None) -> Database:
+def _read_once(file: Path, _modified: str, beside: Path, profile_modified: str | None) -> Database:
     """Keep what was read: its arrays are read-only, and a batch of flights asks for it again and again."""
     return _read(file, None if profile_modified is None else beside)
 
@@ -72,10 +79,7 @@ def _parsed(file: Path) -> Database:
         assert database.content_hash  # goes with it
         return database
 
-    if not file.is_file():
-        return parse()
-    stat = file.stat()
-    database = kept("database", f"{file.resolve()} {stat.st_mtime_ns} {stat.st_size}".encode(), parse)
+    database = kept("database", f"{file.resolve()} {_state(file)}".encode(), parse)
     database.freeze()
     return database
 

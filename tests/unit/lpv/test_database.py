@@ -145,14 +145,14 @@ def test_spoilt_files_are_refused_by_name(toy_database, tmp_path, spoil, words):
 
 @pytest.mark.parametrize("name", ["absent.nc", "absent.mat"])
 def test_missing_file(tmp_path, name):
-    with pytest.raises(InputError, match="no such database file"):
+    with pytest.raises(InputError, match="does not exist; check the path"):
         load_database(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", ["noise.nc", "noise.mat"])
 def test_file_of_another_kind(tmp_path, name):
     (tmp_path / name).write_bytes(b"this is no database, but long enough to have a header " * 20)
-    with pytest.raises(InputError, match="not a readable"):
+    with pytest.raises(InputError, match=r"is damaged, or no .* database"):
         load_database(tmp_path / name)
 
 
@@ -194,9 +194,12 @@ def test_a_database_of_ones_own_from_matlab(tmp_path):
         "C": rng.normal(size=(*grid, 1, 4)),
         "D": rng.normal(size=grid),
     }
-    for kind, texts in (("state", names), ("input", ["stick"]), ("output", ["load_factor"])):
+    content["x_ref"][..., :3] = 0.0  # u, w and pitch close with the axis
+    content["x_ref"][..., 0] = content["airspeed"]
+    units = ["m s^-1", "m/s", "radian", "rad/s"]
+    for kind, texts, of in (("state", names, units), ("input", ["stick"], [""]), ("output", ["load_factor"], ["-"])):
         content[f"{kind}_name"] = np.array(texts, dtype=object)
-        content[f"{kind}_unit"] = np.array(["m/s"] * len(texts), dtype=object)
+        content[f"{kind}_unit"] = np.array(of, dtype=object)
     savemat(tmp_path / "own.mat", content)
     database = load_database(tmp_path / "own.mat")
     assert [variable.name for variable in database.states] == names
