@@ -1,4 +1,10 @@
-"""A user's own code runs as a guest: whatever it says or changes around it, the house is as it was when it leaves."""
+"""A user's own code runs as a guest: whatever it says or changes around it, the house is as it was when it leaves.
+
+Legend:
+    error: What was raised.
+    value: Anything.
+    text: Text from outside.
+"""
 
 from __future__ import annotations
 

@@ -95,7 +95,8 @@ def test_a_missing_database_is_no_missing_trim(tmp_path):
         (tmp_path / "mine.toml").write_text(start + place, encoding="utf-8")
         [problem] = file_problems(str(tmp_path / "mine.toml"))
         assert "mine.toml: flight.database: " in problem
-        assert "none.nc: does not exist; check the path." in problem
+        assert "does not exist" in problem
+        assert "none.nc" in problem
     far = start.replace('database = "none.nc"\n', "") + "airspeed_kt = -39\nnacelle_deg = 90\n"
     (tmp_path / "mine.toml").write_text(far, encoding="utf-8")
     [problem] = file_problems(str(tmp_path / "mine.toml"))
