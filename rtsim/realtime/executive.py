@@ -30,7 +30,7 @@ _NAMES = [signal.name for signal in TIMING_SIGNALS]
 _LATENESS, _WORK, _WORK_CPU, _OVERRUNS = (
     _NAMES.index(name) for name in ("lateness_us", "work_us", "work_cpu_us", "overruns")
 )
-BLOCK_S = 2.0
+BLOCK_S = 1.0
 """Simulated time flown in one piece while the flight is not paced [s]."""
 PAUSE_POLL_S = 0.005
 """How often a paused loop looks for requests [s]."""

@@ -149,6 +149,6 @@ def test_what_went_wrong_inside_is_not_taken_for_ctrl_c(monkeypatch, capsys):
     def broken(*_: object) -> None:
         raise EOFError("Ran out of input")
 
-    monkeypatch.setattr("scenarios.files.loader.load_scenario", broken)
-    assert run(["fly", "hover", "--headless"]) == EXIT_INTERNAL_ERROR
+    monkeypatch.setattr("scenarios.verdicts.tester.is_test", broken)
+    assert run(["test", "hover"]) == EXIT_INTERNAL_ERROR
     assert "EOFError" in capsys.readouterr().err
