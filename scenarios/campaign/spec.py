@@ -12,12 +12,13 @@ import numpy as np
 from pydantic import BaseModel, Field, create_model
 
 from rtsim.choices import CorridorName
-from rtsim.errors import InputError, suggestion
+from rtsim.errors import InputError
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
+from scenarios.files.expectation import name_problems
 from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
 
 Generator = np.random.Generator
@@ -285,17 +286,7 @@ def _expectation_contradictions(spec: CampaignFile, file: str) -> list[InputErro
     names = [item.name for item in spec.classes]
     for number, clause in enumerate(spec.expect):
         key = f"expect[{number}]"
-        if clause.event not in EVENTS:
-            found.append(
-                InputError(
-                    "is not an event",
-                    file=file,
-                    key=f"{key}.event",
-                    value=clause.event,
-                    allowed=", ".join(EVENTS),
-                    mend=suggestion(clause.event, EVENTS, otherwise="choose one"),
-                )
-            )
+        found += name_problems(clause.event, EVENTS, "an event", file=file, key=f"{key}.event")
         laws = ("law", "off", spec.law, *spec.against)
         if clause.of not in laws:
             found.append(

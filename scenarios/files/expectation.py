@@ -1,9 +1,17 @@
-"""What a flight is expected to do: a metric and the range it must lie in."""
+"""What a flight is expected to do: a metric and the range it must lie in.
+
+Legend:
+    file: The file it stands in.
+    key: Where it stands there.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
+
+from rtsim.errors import InputError, suggestion
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,3 +55,32 @@ class Expectation:
             return False
         low = self.minimum is None or value >= self.minimum
         return low and (self.maximum is None or value <= self.maximum)
+
+
+def range_problems(minimum: float | None, maximum: float | None, *, file: str, key: str) -> list[InputError]:
+    """Mistakes in the range of a clause: none at all, or its ends the wrong way round.
+
+    Args:
+        minimum: Smallest value that holds.
+        maximum: Largest value that holds.
+    """
+    if minimum is None and maximum is None:
+        return [InputError("has no limit", file=file, key=key, mend="add min, max or both")]
+    if minimum is not None and maximum is not None and minimum > maximum:
+        problem, allowed = "is larger than max", f"at most {maximum:g}"
+        return [InputError(problem, file=file, key=f"{key}.min", value=minimum, allowed=allowed, mend="swap them")]
+    return []
+
+
+def name_problems(name: str, known: Collection[str], noun: str, *, file: str, key: str) -> list[InputError]:
+    """Whether a clause names something that is not there.
+
+    Args:
+        name: What it names.
+        known: What there is.
+        noun: What that is called, with its article.
+    """
+    if name in known:
+        return []
+    mend = suggestion(str(name), tuple(known), otherwise="choose one")
+    return [InputError(f"is not {noun}", file=file, key=key, value=name, allowed=", ".join(known), mend=mend)]

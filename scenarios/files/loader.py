@@ -14,7 +14,7 @@ from rtsim.strict import Examined
 from rtsim.toml_file import named_text, parse_toml, shipped_names
 from rtsim.units import deg, kt
 from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
-from scenarios.files.expectation import Expectation
+from scenarios.files.expectation import Expectation, name_problems, range_problems
 from scenarios.files.nacelle_laws import automatic_problems, automatic_settings
 from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Scenario, ScenarioEvent
 from scenarios.files.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
@@ -129,30 +129,8 @@ def _expectation_contradictions(content: ScenarioFile, file: str) -> list[InputE
         from rtsim.measures.metrics import METRIC_NAMES  # loads compiled code
 
         key = f"expect[{number}]"
-        if clause.metric not in METRIC_NAMES:
-            found.append(
-                InputError(
-                    "is not a metric",
-                    file=file,
-                    key=f"{key}.metric",
-                    value=clause.metric,
-                    allowed=", ".join(METRIC_NAMES),
-                    mend=suggestion(str(clause.metric), METRIC_NAMES, otherwise="choose one"),
-                )
-            )
-        if clause.min is None and clause.max is None:
-            found.append(InputError("has no limit", file=file, key=key, mend="add min, max or both"))
-        elif clause.min is not None and clause.max is not None and clause.min > clause.max:
-            found.append(
-                InputError(
-                    "is larger than max",
-                    file=file,
-                    key=f"{key}.min",
-                    value=clause.min,
-                    allowed=f"at most {clause.max:g}",
-                    mend="swap them",
-                )
-            )
+        found += name_problems(clause.metric, METRIC_NAMES, "a metric", file=file, key=f"{key}.metric")
+        found += range_problems(clause.min, clause.max, file=file, key=key)
     return found
 
 

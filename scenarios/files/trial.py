@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from rtsim.errors import InputError, suggestion
+from rtsim.errors import InputError
 from rtsim.loop.script import Pulse
 from rtsim.units import deg
-from scenarios.files.expectation import Expectation
+from scenarios.files.expectation import Expectation, name_problems, range_problems
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
 TrialKind = Literal["nominal", "misuse", "failure", "unprotectable"]
@@ -101,22 +101,8 @@ def _test_problems(trial: TrialTable, *, has_events: bool, flight: Mapping[str, 
         from rtsim.measures.metrics import TRIAL_METRICS  # loads compiled code
 
         key = f"trial.expect[{number}]"
-        if clause.metric not in TRIAL_METRICS:
-            found.append(
-                InputError(
-                    "is not a metric of trials",
-                    file=file,
-                    key=f"{key}.metric",
-                    value=clause.metric,
-                    allowed=", ".join(TRIAL_METRICS),
-                    mend=suggestion(clause.metric, TRIAL_METRICS, otherwise="choose one"),
-                )
-            )
-        if clause.min is None and clause.max is None:
-            found.append(InputError("has no limit", file=file, key=key, mend="add min, max or both"))
-        elif clause.min is not None and clause.max is not None and clause.min > clause.max:
-            key = f"{key}.min"
-            found.append(InputError("is larger than max", file=file, key=key, value=clause.min, mend="swap them"))
+        found += name_problems(clause.metric, TRIAL_METRICS, "a metric of trials", file=file, key=f"{key}.metric")
+        found += range_problems(clause.min, clause.max, file=file, key=key)
     return found
 
 
