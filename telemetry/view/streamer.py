@@ -8,7 +8,7 @@ import time
 import warnings
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import rerun as rr
@@ -19,8 +19,9 @@ from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.blueprint import blueprint
 from telemetry.view.corridor import CorridorPlot
 from telemetry.view.instruments import Instruments
-from telemetry.view.options import ViewOptions, partial_name
+from telemetry.view.options import ViewOptions
 from telemetry.view.plots import Plots, history_of, set_row_time
+from telemetry.view.recording import claim_next, partial_name
 from telemetry.view.scene import Scene
 
 APPLICATION = "rtsim"
@@ -69,6 +70,7 @@ class Streamer:
         self._host: Any = None
         self._run = 0
         self._files: list[tuple[Path, Path]] = []
+        self._claims: list[BinaryIO] = []
         self._last_time = -math.inf
         self._pending: list[FloatArray] = []
         self._next_plots = 0.0
@@ -156,7 +158,10 @@ class Streamer:
         elif self._port is not None:
             sinks.append(rr.GrpcSink(self.url))
         if self._options.record is not None:
-            final = self._options.record.with_stem(self._options.record.stem + suffix)
+            final = self._options.record
+            if suffix:  # the first is claimed by the flight
+                final, claim = claim_next(final, "-", self._run)
+                self._claims.append(claim)
             partial = partial_name(final)
             self._files.append((partial, final))
             sinks.append(rr.FileSink(str(partial)))

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rtsim.errors import RtsimError
-from telemetry.exchange.child_process import lower_priority
+from rtsim.processes import lower_priority
 from telemetry.exchange.ring import RingReader
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions

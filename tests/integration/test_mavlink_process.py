@@ -170,7 +170,7 @@ def test_the_vehicle_ends_when_the_flight_is_gone(ground):
     import subprocess
     import sys
 
-    from telemetry.exchange.child_process import child_environment
+    from rtsim.processes import safe_environment
 
     code = (
         "import sys, time\n"
@@ -179,7 +179,7 @@ def test_the_vehicle_ends_when_the_flight_is_gone(ground):
         f"link = MavlinkLink(MavlinkConfig(targets=(Endpoint('127.0.0.1', {ground.endpoint.port}),)))\n"
         "link.wait_ready(); print(link._process.pid, flush=True); time.sleep(60)\n"
     )
-    flight = subprocess.Popen([sys.executable, "-c", code], env=child_environment(), stdout=subprocess.PIPE, text=True)
+    flight = subprocess.Popen([sys.executable, "-c", code], env=safe_environment(), stdout=subprocess.PIPE, text=True)
     vehicle = int(flight.stdout.readline())
     flight.kill()
     flight.wait()

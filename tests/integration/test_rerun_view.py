@@ -20,10 +20,11 @@ import rerun as rr
 
 from rtsim.errors import EXIT_OUTPUT_FAILED, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import safe_environment
 from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.log.corridor_outline import CorridorOutline
-from telemetry.view.options import ViewOptions, display_available, partial_name
+from telemetry.view.options import ViewOptions, display_available
+from telemetry.view.recording import partial_name
 from telemetry.view.view import RerunView
 
 OUTLINE = CorridorOutline.from_lines(
@@ -297,7 +298,7 @@ def test_the_view_finishes_its_file_and_ends_when_the_flight_is_killed(tmp_path:
         [sys.executable, "-c", script, str(record)],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env=child_environment(),
+        env=safe_environment(),
         text=True,
     ) as flight:
         assert flight.stdout is not None
