@@ -98,7 +98,13 @@ class _Pool:
                 self._hand_out(wanted)
                 for connection in wait([worker.connection for worker in self._workers if worker.piece is not None]):
                     self._collect(next(worker for worker in self._workers if worker.connection is connection))
-            yield self._done.pop(wanted)
+            result, failure = self._done.pop(wanted)
+            if failure is not None:
+                kind, arguments, attributes, told = failure
+                error = kind.__new__(kind, *arguments)  # its __init__ would compose the sentence a second time
+                error.__dict__.update(attributes)
+                raise error from RuntimeError(f"in a worker process:\n{told}")
+            yield result
 
     def _hand_out(self, wanted: int) -> None:
         for worker in self._workers:
@@ -111,17 +117,11 @@ class _Pool:
         piece = worker.piece
         assert piece is not None
         try:
-            result, failure = worker.connection.recv()
+            self._done[piece] = worker.connection.recv()
         except (EOFError, OSError):
             self._replace(worker, piece)
-            return
-        worker.piece = None
-        if failure is not None:
-            kind, arguments, attributes, told = failure
-            error = kind.__new__(kind, *arguments)  # its __init__ would compose the sentence a second time
-            error.__dict__.update(attributes)
-            raise error from RuntimeError(f"in a worker process:\n{told}")
-        self._done[piece] = result
+        else:
+            worker.piece = None
 
     def _replace(self, worker: _Worker, piece: int) -> None:
         """Start another for one that died, and let it have the piece."""

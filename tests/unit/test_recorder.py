@@ -303,18 +303,21 @@ def test_a_writer_that_outlives_its_flight_keeps_others_out_until_it_has_ended(t
         wait_until((path / HEADER_PART).exists)
         writer.suspend()
         killed.kill()
-    for refuse in (
-        lambda: check_log(path, overwrite=True),
-        lambda: Recorder(path, METADATA, live=True, overwrite=True),
-    ):
-        with pytest.raises(InputError, match="another flight is writing this log"):
-            refuse(path, overwrite=True)
+    refused(path, "another flight is writing this log")
     writer.resume()
     writer.wait(60.0)
     recorder = Recorder(path, METADATA, live=False, overwrite=True)
     recorder.push_block(flight(5))
     recorder.close({})
     assert len(read_log(path).rows) == 5
+
+
+def refused(path: Path, words: str) -> None:
+    """Both who looks before the flight and who would write refuse."""
+    with pytest.raises(InputError, match=words):
+        check_log(path, overwrite=True)
+    with pytest.raises(InputError, match=words):
+        Recorder(path, METADATA, live=True, overwrite=True)
 
 
 def wait_until(holds: Callable[[], bool]) -> None:
@@ -395,12 +398,7 @@ def test_a_log_with_something_foreign_in_it_is_not_replaced(tmp_path: Path, name
     recorder.close({})
     (path / name).write_text("mine")
     before = sorted(path.iterdir())
-    for refuse in (
-        lambda: check_log(path, overwrite=True),
-        lambda: Recorder(path, METADATA, live=True, overwrite=True),
-    ):
-        with pytest.raises(InputError, match=f"no rtsim log is here: {re.escape(name)}"):
-            refuse(path, overwrite=True)
+    refused(path, f"no rtsim log is here: {re.escape(name)}")
     assert sorted(path.iterdir()) == before
 
 
