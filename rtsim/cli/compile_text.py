@@ -94,7 +94,7 @@ def compile_notice() -> Iterator[None]:
     from rtsim.kernels.progress import told
 
     try:
-        with told(raise_if_lost), told(NOTICE.note):
+        with told(lambda _: raise_if_lost()), told(NOTICE.note):
             yield
     finally:
         NOTICE.finish()

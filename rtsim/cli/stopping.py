@@ -69,10 +69,13 @@ def raise_stop(number: int, frame: FrameType | None = None) -> None:  # noqa: AR
         leave_terminal()
     stop = Interrupted() if number == signal.SIGINT else Terminated(number)
     _newest[:] = [(number, weakref.ref(stop))]
-    raise stop
+    try:
+        raise stop
+    finally:
+        del stop  # or its own traceback would keep it alive
 
 
-def raise_if_lost(_: object = None) -> None:
+def raise_if_lost() -> None:
     """Unwind where a signal asked for it and what was raised is nowhere any more."""
     if _newest and _newest[-1][1]() is None:
         raise_stop(_newest[-1][0])

@@ -334,7 +334,7 @@ class Vehicle(Outbox):
         """Start with stored values; the flight hears of those that differ from what it was told."""
         try:
             self.store.load(path)
-        except InputError as failure:
+        except (InputError, OSError) as failure:
             self.board.say(WARNING, f"Parameters not loaded: {failure}")
             return
         told = ParameterStore(self.config.aids, self.config.parameters)
