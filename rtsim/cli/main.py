@@ -14,6 +14,7 @@ import typer
 from rtsim import __version__
 from rtsim.cli import stopping
 from rtsim.cli.compile_text import compile_notice
+from rtsim.cli.surroundings import leave_settings_of_others
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError
 
 EXIT_INTERNAL_ERROR = 70
@@ -209,6 +210,7 @@ def _usage_error(error: Exception, message: str) -> int:
 def main() -> None:
     """Entry point of the ``rtsim`` command: handles the signals of the process, then ends it with the exit code."""
     _open_closed_streams()
+    leave_settings_of_others()
     stopping.catch_signals()
     sys.exit(run())
 

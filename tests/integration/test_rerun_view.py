@@ -22,8 +22,9 @@ import rerun as rr
 from rtsim.errors import EXIT_OUTPUT_FAILED, InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.processes import safe_environment
-from telemetry.exchange.ring import TIMING_COUNT
+from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT
 from telemetry.log.corridor_outline import CorridorOutline
+from telemetry.view import streamer
 from telemetry.view.options import ViewOptions, display_available
 from telemetry.view.recording import check_recording, partial_name
 from telemetry.view.view import RerunView
@@ -268,6 +269,23 @@ def test_a_further_run_leaves_alone_what_is_no_recording(tmp_path: Path, told: l
         fly(view, rows)
     assert (tmp_path / "flight-2.rrd").read_text() == "mine"
     assert (tmp_path / "flight-3.rrd").exists()
+
+
+def test_a_long_recording_goes_on_in_another_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(streamer, "SPLIT_S", 0.0)
+    options = ViewOptions(viewer=False, record=tmp_path / "flight.rrd")
+    stream = streamer.Streamer(options, outline=OUTLINE, title="test", rate_hz=250.0, port=None)
+    rows = rows_of_a_conversion(3.0)
+    rows = np.hstack([rows, np.zeros((len(rows), ROW_WIDTH - rows.shape[1]))])
+    stream.take(rows[:250])  # what is empty is not split
+    stream.take(rows[250:500])
+    assert (tmp_path / "flight.rrd").exists(), "the first part has its name already"
+    stream.take(rows[500:])
+    assert stream.close() == []
+    speeds = []
+    for name in ("flight", "flight-2", "flight-3"):
+        speeds += [row[0] for row in values(tmp_path / f"{name}.rrd", "/plots/speed/kn", "Scalars:scalars")]
+    assert speeds == rows[::5, COLUMN.airspeed_kt].tolist()
 
 
 def test_a_missing_viewer_is_told_and_the_recording_goes_on(tmp_path: Path, told: list[str]) -> None:
