@@ -208,6 +208,9 @@ class Streamer:
             else:
                 self._broken.append(partial)
         self._files.clear()
+        for held in self._claims:
+            held.close()
+        self._claims.clear()
 
     def _send_plots(self) -> None:
         if self._pending:
