@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterable
 
 EXIT_EXPECTATION_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_OVERRUN = 3
 EXIT_OUTPUT_FAILED = 4
-EXIT_TERMINATED = 143
 LONGEST_VALUE = 300
 """Of a longer value only the beginning is shown [characters]."""
 
 
 class Terminated(SystemExit):
-    """SIGTERM arrived: unwinds like Ctrl-C, so that files are closed, and ends with exit code 143."""
+    """A signal asked for the end: unwinds like Ctrl-C, so that files are closed, and ends with 128 + its number."""
 
-    def __init__(self) -> None:
-        super().__init__(EXIT_TERMINATED)
+    def __init__(self, signal_number: int = signal.SIGTERM) -> None:
+        """Choose the exit code.
+
+        Args:
+            signal_number: The signal.
+        """
+        super().__init__(128 + signal_number)
 
 
 class RtsimError(Exception):

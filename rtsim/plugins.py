@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -128,6 +129,14 @@ def _from_module(name: str, kind: PluginKind) -> Any:
             mend="correct the module",
         ) from error
     target = getattr(module, class_name, None)
+    mine = Path.cwd() / f"{module_name}.py"
+    if target is None and mine.exists() and not mine.samefile(getattr(module, "__file__", None) or os.devnull):
+        raise InputError(
+            f"its module is not found because an installed one is called {module_name} too",
+            key=kind.option,
+            value=name,
+            mend=f"give {mine.name} another name",
+        )
     if target is None:
         classes = [key for key, value in vars(module).items() if isinstance(value, type) and hasattr(value, "step")]
         raise InputError(

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 from rtsim.cli.output import console
+from rtsim.cli.stopping import raise_if_lost
 
 if TYPE_CHECKING:
     from rtsim.kernels.progress import Compiling
@@ -93,7 +94,7 @@ def compile_notice() -> Iterator[None]:
     from rtsim.kernels.progress import told
 
     try:
-        with told(NOTICE.note):
+        with told(lambda _: raise_if_lost()), told(NOTICE.note):
             yield
     finally:
         NOTICE.finish()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.output import console, emit_json, results
+from rtsim.drawing import drawing
 from rtsim.errors import InputError
 from rtsim.whole_file import check_writable, whole_file
 
@@ -198,6 +199,7 @@ def _print_table(corridor: Corridor) -> None:
     results.print(f"High side: {corridor.high.kind}. {corridor.high.source}", markup=False)
 
 
+@drawing()
 def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> None:
     """Draw the corridor, airspeed across and nacelle angle up, helicopter mode on top as in the paper."""
     formats = (".png", ".svg", ".pdf")

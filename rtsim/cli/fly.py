@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from rtsim.choices import HAND_PILOT
+from rtsim.cli import stopping
 from rtsim.cli.compile_text import NOTICE
 from rtsim.cli.flight_text import FlightScreen, describe, say, summarize
 from rtsim.cli.options import takes_options
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
     from scenarios.flight.result import FlightRecord
     from telemetry.view.options import ViewOptions
-
-EXIT_BY_SIGNAL = {signal.SIGINT: 130, signal.SIGTERM: 143}
-"""Exit codes after a clean end that a signal asked for."""
 
 
 Layout = Literal["pilot", "engineer"]
@@ -360,11 +358,11 @@ def _fly(
                 outputs=wanted,
             )
     summarize(flight, first_frame_s=screen.first_frame_s)
-    return flight, screen.first_frame_s, EXIT_BY_SIGNAL.get(signals.received, 0) if signals.received else 0
+    return flight, screen.first_frame_s, stopping.exit_code(signals.received) if signals.received else 0
 
 
 class StoppingSignals:
-    """SIGINT and SIGTERM end a running flight cleanly; a second one ends the program at once."""
+    """Signals that end a command end a running flight cleanly; a second one ends the program at once."""
 
     def __init__(self, control: FlightControl) -> None:
         """Prepare; nothing is caught before :meth:`arm`.
@@ -379,7 +377,10 @@ class StoppingSignals:
 
     def arm(self) -> None:
         """Catch the signals from now on; before, they end the program as usual."""
-        for number in EXIT_BY_SIGNAL:
+        stopping.raise_if_lost()
+        for number in stopping.SIGNALS:
+            if signal.getsignal(number) == signal.SIG_IGN:
+                continue  # nohup
             self._previous[number] = signal.signal(number, self._handle)
 
     def disarm(self) -> None:
@@ -393,6 +394,8 @@ class StoppingSignals:
             self.disarm()
             os.kill(os.getpid(), number)
             return
+        if number == signal.SIGHUP:
+            stopping.leave_terminal()
         self.received = signal.Signals(number)
         name = "Ctrl-C" if number == signal.SIGINT else self.received.name
         self._control.stop(f"stopped by {name}")

@@ -5,19 +5,19 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
-from types import FrameType
 from typing import Annotated
 
 import typer
 
 from rtsim import __version__
+from rtsim.cli import stopping
 from rtsim.cli.compile_text import compile_notice
 from rtsim.cli.output import machine_output
-from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, EXIT_TERMINATED, RtsimError, Terminated
+from rtsim.cli.surroundings import leave_settings_of_others
+from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError
 
 EXIT_INTERNAL_ERROR = 70
 EXIT_BROKEN_PIPE = 141
@@ -130,17 +130,6 @@ def _open_closed_streams() -> None:
             setattr(sys, name, stream)
 
 
-_stopped_by: list[int] = []
-"""Signals that asked the process to end: raised inside a compiler's callback they are lost, and it fails later."""
-
-
-def _raise_stop(signal_number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - signature of a handler
-    _stopped_by.append(signal_number)
-    if signal_number == signal.SIGTERM:
-        raise Terminated
-    raise KeyboardInterrupt
-
-
 def _describe(error: OSError) -> str:
     name = error.filename if error.filename is not None else "output"
     if isinstance(name, bytes):
@@ -157,7 +146,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 done and all expectations held; 1 an expectation failed or a replay differs; 2 bad input; 3 stopped by the
         overrun policy; 4 a file or socket failed; 70 a fault of rtsim's own; 130 Ctrl-C; 141 the reader of the output
-        went away; 143 SIGTERM.
+        went away; 129, 131, 143 SIGHUP, SIGQUIT, SIGTERM.
     """
     try:
         code = _invoke(arguments)
@@ -175,8 +164,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         _fail(_describe(error))
         return EXIT_OUTPUT_FAILED
     except Exception:  # noqa: BLE001 - the last resort: a fault of ours, told apart from the user's by its exit code
-        if _stopped_by:
-            return EXIT_TERMINATED if signal.SIGTERM in _stopped_by else EXIT_INTERRUPTED
+        if (number := stopping.stopped_by()) is not None:  # what was raised for it was lost, and something failed later
+            return stopping.exit_code(number)
         import traceback
 
         traceback.print_exc()
@@ -224,9 +213,8 @@ def _usage_error(error: Exception, message: str) -> int:
 def main() -> None:
     """Entry point of the ``rtsim`` command: handles the signals of the process, then ends it with the exit code."""
     _open_closed_streams()
-    # Shells start background jobs with SIGINT ignored; a flight must still end cleanly when it is asked to.
-    signal.signal(signal.SIGINT, _raise_stop)
-    signal.signal(signal.SIGTERM, _raise_stop)
+    leave_settings_of_others()
+    stopping.catch_signals()
     sys.exit(run())
 
 

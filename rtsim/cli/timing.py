@@ -9,6 +9,7 @@ import typer
 
 from rtsim.cli.flight_text import say
 from rtsim.cli.output import emit_json, results
+from rtsim.drawing import drawing
 from rtsim.errors import InputError
 from rtsim.whole_file import check_writable, whole_file
 
@@ -127,11 +128,9 @@ def _print(report: TimingReport, rate: int) -> None:
         results.print(f"  {'held  ' if held else 'MISSED'} {name}: {value:.2f} (limit {goal:g})", markup=False)
 
 
+@drawing()
 def _draw(log: TimingLog, path: Path, rate: int) -> None:
     """Histograms of lateness and work on logarithmic axes."""
-    import matplotlib as mpl
-
-    mpl.use("Agg")
     import matplotlib.pyplot as plt
     import numpy as np
 

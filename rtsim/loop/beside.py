@@ -10,13 +10,12 @@ import atexit
 import contextlib
 import os
 import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numba
 
 from rtsim.kernels import progress, store
+from rtsim.processes import end_process, start_process
 
 _CONFIGURATION: Any = numba.config  # its names are made at run time
 CHILD = "RTSIM_COMPILES_BESIDE"
@@ -48,18 +47,14 @@ def start(plant: str) -> None:
     progress.expect(KERNELS_ALONE)
     if (os.cpu_count() or 1) < 2 or store.writable_folder() is None:
         return
-    root = str(Path(__file__).resolve().parents[2])
-    paths = [root, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
-    environment = {**os.environ, CHILD: "1", "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
     with contextlib.suppress(OSError):  # then the flight compiles all of it
         _running.append(
-            subprocess.Popen(
-                [sys.executable, "-m", "rtsim.loop.compile_beside", *_wanted],
-                env=environment,
-                stdin=subprocess.DEVNULL,
+            start_process(
+                "rtsim.loop.compile_beside",
+                *_wanted,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                start_new_session=True,
+                variables={CHILD: "1"},
             )
         )
         progress.expect(KERNELS_BESIDE)
@@ -74,6 +69,7 @@ def finish(plant: str) -> None:
     """
     for process in _running:
         process.wait()
+        end_process(process)
     _running.clear()
     if CHILD not in os.environ and not _CONFIGURATION.DISABLE_JIT and store.read(_marker(plant)) is None:
         store.write(_marker(plant), b"")
@@ -87,5 +83,4 @@ def _marker(plant: str) -> str:
 def _end() -> None:
     """The flight gave up while it was compiled: so does the process beside it."""
     for process in _running:
-        process.kill()
-        process.wait()
+        end_process(process)

@@ -12,12 +12,14 @@ from rtsim.kernels.packed import packed
 from rtsim.loop.data import PART, Flight
 from rtsim.loop.loading import load_part
 from rtsim.loop.setup import FlightSetup, build_parts, new_scratch, start_state
+from rtsim.processes import end_with_parent
 from rtsim.programme import Programme
 from rtsim.protection.monitor import compile_watch
 
 
 def main() -> None:
     """Compile the parts that are not the flight's own half."""
+    end_with_parent()
     programme = Programme.hold(airspeed=0.0, nacelle_angle=math.pi / 2.0, altitude=100.0)
     setup = FlightSetup(programme=programme).with_options(protection="monitor")
     parts = build_parts(setup)

@@ -16,6 +16,7 @@ from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
 from rtsim.pilot.problem import MocmError, MocmProblem, build_problem
 from rtsim.pilot.weights import PilotSettings, pilot_settings
+from rtsim.worker_pool import work
 
 ARRAYS = ("A", "B", "C", "nacelle_effect", "l", "G2", "F", "V_y", "V_u", "g", "valid")
 """Arrays of a scheduled pilot, leading axes [airspeed, nacelle]."""
@@ -151,15 +152,8 @@ def _design_row(
 def _rows(
     database: Database, layout: PlantLayout, settings: PilotSettings, jobs: int
 ) -> Iterator[list[tuple[int, int, DesignPlant, MocmDesign | None]]]:
-    numbers = range(database.nacelle.size)
-    if jobs == 1:
-        for number in numbers:
-            yield _design_row(database, layout, settings, number)
-        return
-    from joblib import Parallel, delayed
-
-    tasks = (delayed(_design_row)(database, layout, settings, number) for number in numbers)
-    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks)
+    pieces = [(database, layout, settings, number) for number in range(database.nacelle.size)]
+    yield from work(_design_row, pieces, jobs=jobs)
 
 
 def design_schedule(

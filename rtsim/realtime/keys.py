@@ -8,11 +8,11 @@ import select
 import sys
 import termios
 import threading
-import tty
 from types import TracebackType
 from typing import Any, Self
 
 from rtsim.realtime.control import FlightControl
+from rtsim.terminal import in_foreground, take_keys
 
 KEY_HELP = (
     "space pause, . one frame, + - warp, r reset, p pilot, o override protection, t rate damping, "
@@ -81,11 +81,10 @@ class KeyReader:
         return self._thread is not None
 
     def __enter__(self) -> Self:
-        if self._descriptor >= 0 and os.isatty(self._descriptor) and _in_foreground(self._descriptor):
+        if self._descriptor >= 0 and os.isatty(self._descriptor) and in_foreground(self._descriptor):
             self._saved = termios.tcgetattr(self._descriptor)
             atexit.register(self._restore)
-            # cbreak: keys arrive without Enter, and Ctrl-C and Ctrl-Z still work.
-            tty.setcbreak(self._descriptor)
+            take_keys(self._descriptor)
             self._thread = threading.Thread(target=self._read, name="keys", daemon=True)
             self._thread.start()
         return self
@@ -103,14 +102,15 @@ class KeyReader:
         saved, self._saved = self._saved, None
         if saved is not None:
             atexit.unregister(self._restore)
-            if _in_foreground(self._descriptor):
+            if in_foreground(self._descriptor):
                 termios.tcsetattr(self._descriptor, termios.TCSADRAIN, saved)
 
     def _read(self) -> None:
         while not self._closing.is_set():
             ready, _, _ = select.select([self._descriptor], [], [], POLL_S)
+            take_keys(self._descriptor)
             # A job in the background that touched its terminal would be stopped by the kernel, flight and all.
-            if not ready or not _in_foreground(self._descriptor):
+            if not ready or not in_foreground(self._descriptor):
                 if ready:
                     self._closing.wait(POLL_S)
                 continue
@@ -129,10 +129,3 @@ def _standard_input() -> int:
         return sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
         return -1
-
-
-def _in_foreground(descriptor: int) -> bool:
-    try:
-        return os.tcgetpgrp(descriptor) == os.getpgrp()
-    except OSError:
-        return False

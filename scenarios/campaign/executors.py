@@ -10,14 +10,12 @@ from __future__ import annotations
 import contextlib
 import warnings
 from collections.abc import Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from typing import Any, Protocol
 
 from rtsim.errors import InputError, OutputError
+from rtsim.worker_pool import WorkersDied, work
 from scenarios.campaign.chunks import Chunk, ChunkResult, Task, fly_chunk
 
-WAVE = 4
-"""Pieces per worker that are under way or waiting at a time."""
 CONNECT_TIMEOUT_S = 10.0
 """How long a Dask scheduler may take to answer [s]."""
 
@@ -45,26 +43,12 @@ class LocalExecutor:
         """Fly pieces in order.
 
         Raises:
-            OutputError: A worker process died.
+            OutputError: Worker processes died again and again.
         """
-        if self._jobs == 1 or len(chunks) <= 1:
-            for chunk in chunks:
-                yield fly_chunk(task, chunk)
-            return
-        from joblib import Parallel, delayed
-
-        # Waves instead of one long list: what is finished can be kept, and the end can come early.
-        # Each piece is given on as it comes: what is finished is kept even if the rest of its wave is not.
         try:
-            with Parallel(n_jobs=self._jobs, batch_size=1, return_as="generator") as workers:
-                size = WAVE * self._jobs
-                for begin in range(0, len(chunks), size):
-                    yield from workers(delayed(fly_chunk)(task, chunk) for chunk in chunks[begin : begin + size])
-        except BrokenProcessPool as error:
-            raise OutputError(
-                "a worker process died: memory ran out, somebody ended it, or the law under test ended its process; "
-                "with --out FOLDER the same command goes on where it stopped."
-            ) from error
+            yield from work(fly_chunk, [(task, chunk) for chunk in chunks], jobs=self._jobs)
+        except WorkersDied as error:
+            raise OutputError(f"{error}; with --out FOLDER the same command goes on where it stopped.") from error
 
 
 class DaskExecutor:

@@ -47,10 +47,13 @@ class MavlinkOptions:
     """Start of the flight on the globe."""
 
 
-def default_parameter_file() -> Path:
-    """Where parameters are stored where nothing else is said: the user's configuration directory."""
+def default_parameter_file() -> Path | None:
+    """Where parameters are stored where nothing else is said: the user's configuration directory, if he has one."""
     base = os.environ.get("XDG_CONFIG_HOME")
-    return (Path(base) if base else Path.home() / ".config") / "rtsim" / "mavlink_parameters.toml"
+    try:
+        return (Path(base) if base else Path.home() / ".config") / "rtsim" / "mavlink_parameters.toml"
+    except RuntimeError:  # neither HOME nor an entry for the user
+        return None
 
 
 def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[MavlinkConfig, str | None]:
@@ -68,6 +71,9 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
     targets, host, port, warning = endpoints(options.targets, allow_network=options.allow_network, bind=options.bind)
     stick_map = load_vehicle_map(options.stick_map)
     parameter_file = options.parameter_file or default_parameter_file()
+    if parameter_file is None:
+        homeless = "There is no home folder to keep MAVLink parameters in; --mavlink-parameters FILE names a place."
+        warning = f"{warning} {homeless}" if warning else homeless
     always = {"automatic_flaps": scenario.options.automatic_flaps, "governor": scenario.options.governor}
     aids_on = {*scenario.options.aids, *(name for name, on in always.items() if on)}
     config = MavlinkConfig(
@@ -80,7 +86,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         home=options.home,
         aids={name: name in aids_on for name in SWITCHES},
         parameters=stick_settings(stick_map).parameters(),
-        parameter_file=str(parameter_file),
+        parameter_file=str(parameter_file) if parameter_file is not None else None,
         axes={str(control): source for control, source in stick_map.axes.items()},
         buttons={str(function): bit for function, bit in stick_map.buttons.items()},
         signing_key_file=str(options.signing_key) if options.signing_key else None,

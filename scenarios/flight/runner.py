@@ -37,6 +37,8 @@ from scenarios.flight.result import FlightRecord, judge
 from scenarios.flight.session import FlightSession
 from scenarios.flight.sinks import FlightSinks
 from telemetry.log.format import FlightMetadata, LogEvent
+from telemetry.log.place import check_log
+from telemetry.view.recording import check_recording
 
 if TYPE_CHECKING:
     from telemetry.log.recorder import Recorder
@@ -101,11 +103,12 @@ def fly(
     """
     if outputs is not None:
         instance(outputs, FlightOutputs, "outputs", "give FlightOutputs(log=...)")
+    outputs = outputs if outputs is not None else FlightOutputs()
+    _refuse_outputs(outputs)
     scenario = _chosen(scenario, overrides)
     if speed != "max":
         checked_speed(speed)
     policy = OverrunPolicy.parse(overrun_policy)
-    outputs = outputs if outputs is not None else FlightOutputs()
     pilot_factory = load_pilot(scenario.options.pilot)
     nacelle_law = load_nacelle_law(scenario.options.nacelle)
     live = speed != "max"
@@ -160,10 +163,18 @@ def fly(
             record = dataclasses.replace(record, mavlink=hands.summary())
     except BaseException:
         _close_mavlink(link)
-        _close(log, view, None)
+        _close(log, view, None, outputs.on_message)
         raise
     link_failure = _close_mavlink(link)
-    return dataclasses.replace(record, failure=_close(log, view, record) or link_failure)
+    return dataclasses.replace(record, failure=_close(log, view, record, outputs.on_message) or link_failure)
+
+
+def _refuse_outputs(outputs: FlightOutputs) -> None:
+    """Refuse what could not be written, before anything is started."""
+    if outputs.log is not None:
+        check_log(outputs.log, overwrite=outputs.overwrite)
+    if outputs.view is not None and outputs.view.record is not None:
+        check_recording(outputs.view.record)
 
 
 def _chosen(scenario: str | Path | Scenario, overrides: Overrides | None) -> Scenario:
@@ -285,7 +296,12 @@ def _limit_watch(scenario: Scenario, dt: float) -> Callable[[Callable[[LogEvent]
     return functools.partial(LimitWatch, scenario.options.corridor_name, dt=dt, database=scenario.options.database)
 
 
-def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | None) -> OutputError | None:
+def _close(
+    log: Recorder | None,
+    view: RerunView | None,
+    record: FlightRecord | None,
+    on_message: Callable[[str], None] | None,
+) -> OutputError | None:
     """Close log and view whatever happened; the first that failed is reported."""
     failure: OutputError | None = None
     if log is not None:
@@ -293,6 +309,9 @@ def _close(log: Recorder | None, view: RerunView | None, record: FlightRecord | 
             log.close(_log_summary(record) if record is not None else None)
         except OutputError as error:
             failure = error
+        if on_message is not None:
+            for note in log.notes:  # what became of its writer after the last frame
+                on_message(f"{note[:1].upper()}{note[1:]}.")
     if view is not None:
         view.close()
         failure = failure or view.failure

@@ -31,6 +31,11 @@ class RowLog(Protocol):
         """Why the log stopped growing, once it has."""
         ...
 
+    @property
+    def notes(self) -> list[str]:
+        """What became of its writer and is worth an event; to be taken out."""
+        ...
+
     def push(self, row: FloatArray, timing: FloatArray | None = None) -> None:
         """Keep one row."""
         ...
@@ -191,8 +196,7 @@ class FlightSinks:
         self.history.append(row)
         if self._log is not None:
             self._log.push(row, timing)
-            if self._log.failure is not None:
-                self._drop_log(row, self._log.failure)
+            self._watch_log(self._log, row)
         if self._watch_corridor and row[COLUMN.corridor_level] != self._level:
             self._tell_level(row)
         if self._limits is not None:
@@ -207,8 +211,7 @@ class FlightSinks:
         self.history.extend(rows)
         if self._log is not None:
             self._log.push_block(rows)
-            if self._log.failure is not None:
-                self._drop_log(rows[-1], self._log.failure)
+            self._watch_log(self._log, rows[-1])
         if self._view is not None:
             self._show_block(self._view, rows)
         if self._watch_corridor:
@@ -240,11 +243,15 @@ class FlightSinks:
         if self._on_event is not None:
             self._on_event(event)
 
-    def _drop_log(self, row: FloatArray, failure: OutputError) -> None:
-        """Go on without a log that broke, and say so at once."""
-        self._log = None
-        frame, time_s = int(row[COLUMN.frame]), float(row[COLUMN.time_s])
-        self.event(LogEvent(frame, time_s, "log_failed", str(failure), "warning"))
+    def _watch_log(self, log: RowLog, row: FloatArray) -> None:
+        """Say at once what became of the log's writer; go on without a log that broke."""
+        if log.notes or log.failure is not None:
+            frame, time_s = int(row[COLUMN.frame]), float(row[COLUMN.time_s])
+            if log.failure is not None:
+                self._log = None
+                self.event(LogEvent(frame, time_s, "log_failed", str(log.failure), "warning"))
+            while log.notes:
+                self.event(LogEvent(frame, time_s, "log_writer", log.notes.pop(0), "warning"))
 
     def _show_block(self, view: RowView, rows: FloatArray) -> None:
         """Push rows no faster than the view takes them, so that a recording at full speed has no holes."""

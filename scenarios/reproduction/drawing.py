@@ -11,6 +11,7 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
+from rtsim.drawing import drawing
 from rtsim.optimization.path import ConversionPath
 from rtsim.units import deg, to_kt
 from rtsim.whole_file import whole_file
@@ -186,11 +187,10 @@ def save_figures(
     Raises:
         OutputError: A picture cannot be written.
     """
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
     files: dict[int, list[Path]] = {}
-    with mpl.rc_context(STYLE):
+    with drawing(**STYLE):
+        from matplotlib.figure import Figure
+
         for plan in plans:
             figure = Figure(figsize=plan.size, layout="constrained")
             figure.suptitle(f"Figure {plan.number}. {plan.title}", x=0.01, ha="left", fontsize=10.5)

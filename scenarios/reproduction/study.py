@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from rtsim.errors import InputError
 from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.path import ConversionPath
+from rtsim.worker_pool import work
 from scenarios.reproduction.claims import Claim, judge_claims
 from scenarios.reproduction.evidence import (
     Evidence,
@@ -143,14 +144,7 @@ def _tasks(variants: tuple[Variant, ...]) -> list[tuple[Variant, tuple[str, ...]
 
 def _all_flown(variants: tuple[Variant, ...], jobs: int, advance: Callable[[float], None]) -> Iterator[_Flown]:
     tasks = _tasks(variants)
-    if jobs == 1:
-        parts: Iterator[_Flown] = (_fly_variant(variant, names) for variant, names in tasks)
-    else:
-        from joblib import Parallel, delayed
-
-        work = (delayed(_fly_variant)(variant, names) for variant, names in tasks)
-        parts = Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
-    for part in parts:
+    for part in work(_fly_variant, tasks, jobs=jobs):
         advance(len(part.measures) + (DESIGN_WEIGHT if part.variant.pilot is not None else 0))
         yield part
 

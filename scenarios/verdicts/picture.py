@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rtsim.arrays import FloatArray
+from rtsim.drawing import drawing
 from rtsim.frame import COLUMN
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.boundary import load_boundary
@@ -81,11 +82,11 @@ def picture(case: Case) -> str:
     Returns:
         The picture as a data address (SVG).
     """
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     # A fixed salt: equal flights give equal files.
-    with rc_context({"svg.hashsalt": "rtsim", "font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False}):
+    style = {"svg.hashsalt": "rtsim", "font.size": 9.0, "axes.spines.top": False, "axes.spines.right": False}
+    with drawing(**style):
+        from matplotlib.figure import Figure
+
         figure = Figure(figsize=(11.5, 8.2), layout="constrained")
         grid = figure.add_gridspec(5, 2, width_ratios=(1.0, 1.1), height_ratios=(1.5, 1.2, 0.9, 0.9, 0.7))
         flights = _flights(case)

@@ -7,18 +7,15 @@ copy, skips them and counts them as dropped. There is no lock that one side coul
 
 from __future__ import annotations
 
-import atexit
-import sys
 import threading
 import time
-from multiprocessing import resource_tracker
-from multiprocessing.shared_memory import SharedMemory
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_COUNT, TIMING_SIGNALS
+from telemetry.exchange.shared_memory import SharedMemory
 
 TIMING_COUNT = len(TIMING_SIGNALS)
 """Number of wall-clock columns that follow the signals in a full row."""
@@ -33,7 +30,7 @@ _MAGIC_WORD, _CAPACITY_WORD, _WIDTH_WORD, _WRITTEN, _CONSUMED, _DROPPED, _HEARTB
 
 
 class Ring:
-    """The writing end; creates the shared memory and removes it again."""
+    """The writing end; makes the shared memory."""
 
     def __init__(self, capacity: int = RING_CAPACITY) -> None:
         """Create the shared memory.
@@ -49,7 +46,7 @@ class Ring:
             raise InputError("the ring needs a power of two of slots", key="capacity", value=capacity)
         self.capacity = capacity
         """Number of slots."""
-        self._memory = SharedMemory(create=True, size=8 * (_HEADER_WORDS + capacity * ROW_WIDTH))
+        self._memory = SharedMemory(8 * (_HEADER_WORDS + capacity * ROW_WIDTH))
         self._header = _header_of(self._memory)
         self._slots = np.ndarray(
             (capacity, ROW_WIDTH), dtype=np.float64, buffer=self._memory.buf, offset=8 * _HEADER_WORDS
@@ -64,12 +61,11 @@ class Ring:
         self._open = True
         self._header[_CAPACITY_WORD], self._header[_WIDTH_WORD] = capacity, ROW_WIDTH
         self._header[_MAGIC_WORD] = _MAGIC
-        atexit.register(self.close)
 
     @property
-    def name(self) -> str:
-        """Name under which a reader attaches."""
-        return self._memory.name
+    def descriptor(self) -> int:
+        """What a reader attaches to; its process must be handed it."""
+        return self._memory.descriptor
 
     @property
     def written(self) -> int:
@@ -111,40 +107,38 @@ class Ring:
         self._header[_CONSUMED] = self._written
 
     def close(self) -> None:
-        """Remove the shared memory; a reader that is still attached keeps its mapping until it closes."""
+        """Let the shared memory go; a reader that is still attached keeps its mapping until it closes."""
         if not self._open:
             return
         self._open = False
-        atexit.unregister(self.close)
         self._header.release()
         self._history, self._timing = [], []
         del self._slots
         self._memory.close()
-        self._memory.unlink()
 
 
 class RingReader:
     """The reading end, in any process of the same machine. One reader per ring."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, descriptor: int) -> None:
         """Attach to a ring.
 
         Args:
-            name: ``Ring.name``.
+            descriptor: ``Ring.descriptor``, handed to this process.
 
         Raises:
             InputError: There is no such ring, or it has another layout.
         """
         try:
-            self._memory = _attach_untracked(name)
-        except (FileNotFoundError, ValueError) as failure:
-            raise InputError("there is no ring of this name", key="ring", value=name) from failure
+            self._memory = SharedMemory(descriptor=descriptor)
+        except (OSError, ValueError) as failure:
+            raise InputError("there is no such ring", key="ring", value=descriptor) from failure
         self._header = _header_of(self._memory)
         capacity, width = int(self._header[_CAPACITY_WORD]), int(self._header[_WIDTH_WORD])
         if self._header[_MAGIC_WORD] != _MAGIC or width != ROW_WIDTH:
             self._header.release()
             self._memory.close()
-            raise InputError("this shared memory is no ring of this version", key="ring", value=name)
+            raise InputError("this shared memory is no ring of this version", key="ring", value=descriptor)
         self._capacity = capacity
         self._slots = np.ndarray((capacity, width), dtype=np.float64, buffer=self._memory.buf, offset=8 * _HEADER_WORDS)
         self._next = int(self._header[_CONSUMED])
@@ -204,21 +198,4 @@ class RingReader:
 
 def _header_of(memory: SharedMemory) -> memoryview[int]:
     """The counters at the start of the memory, as 64-bit words."""
-    assert memory.buf is not None
     return memory.buf[: 8 * _HEADER_WORDS].cast("q")
-
-
-def _attach_untracked(name: str) -> SharedMemory:
-    """Attach without telling the resource tracker, which would remove the ring when this process ends."""
-    if sys.version_info >= (3, 13):
-        return SharedMemory(name, track=False)
-    register = resource_tracker.register
-    resource_tracker.register = _register_nothing  # type: ignore[assignment]  # takes anything, does nothing
-    try:
-        return SharedMemory(name)
-    finally:
-        resource_tracker.register = register
-
-
-def _register_nothing(*_: object) -> None:
-    """Stands in for the resource tracker's ``register`` while a reader attaches."""

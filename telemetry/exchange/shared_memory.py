@@ -1,19 +1,65 @@
-"""Two ways to pass values through shared memory without a lock: newest value, and queue of records.
+"""Memory shared with a helper process, and two ways to pass values through it without a lock.
+
+The memory has no name. A helper is handed its descriptor, and it is gone with the last process that holds it, however
+that one ended.
 
 A value that is written whole and read often lives in a sequence lock: the writer makes the count odd, writes, makes it
 even; a reader that saw the count change keeps what it had and looks again in the next frame. Things that happen once go
-through a queue with one writer and one reader.
+through a queue with one writer and one reader. What a helper would need if it were started again is kept in two slots,
+one of which is always whole.
 """
 
 from __future__ import annotations
 
+import mmap
+import os
 import struct
+import tempfile
 import threading
-from multiprocessing.shared_memory import SharedMemory
 from typing import cast
 
 WORD = 8
 """Bytes of a word."""
+
+
+class SharedMemory:
+    """Zeros at first; from either side."""
+
+    def __init__(self, size: int | None = None, *, descriptor: int = -1) -> None:
+        """Make it, or attach to it.
+
+        Args:
+            size: How much to make [bytes]; None attaches.
+            descriptor: What was handed to this process.
+
+        Raises:
+            OSError: There is none of this descriptor.
+            ValueError: What is there has no size.
+        """
+        self._owns = size is not None
+        if size is not None:
+            descriptor = _nameless()
+            os.ftruncate(descriptor, size)
+        self.descriptor = descriptor
+        """What a helper is handed."""
+        self._map = mmap.mmap(descriptor, 0)
+        self.buf = memoryview(self._map)
+        """The bytes."""
+
+    def close(self) -> None:
+        """Let it go; views of ``buf`` must have been released."""
+        self.buf.release()
+        self._map.close()
+        if self._owns:
+            os.close(self.descriptor)
+
+
+def _nameless() -> int:
+    """A descriptor of memory, or of a file without a name where there is no such memory."""
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("rtsim")
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
 
 
 class SequenceLock:
@@ -28,7 +74,6 @@ class SequenceLock:
             count: How many values.
         """
         buffer = memory.buf
-        assert buffer is not None
         # Two readings of the count around a copy show a torn read.
         self._count = buffer[offset : offset + WORD].cast("q")
         self._values = buffer[offset + WORD : offset + WORD * (1 + count)].cast("d")
@@ -82,7 +127,6 @@ class Queue:
             slots: How many records fit.
         """
         buffer = memory.buf
-        assert buffer is not None
         self._ends = buffer[offset : offset + 2 * WORD].cast("q")
         first = offset + 2 * WORD
         self._buffer = buffer[first : first + slots * record.size]
@@ -123,3 +167,50 @@ class Queue:
         """Let the shared memory go."""
         self._buffer.release()
         self._ends.release()
+
+
+class Kept:
+    """The newest of what one side puts by for whoever takes its place; always whole."""
+
+    def __init__(self, memory: SharedMemory, offset: int, *, size: int) -> None:
+        """Lay it over shared memory.
+
+        Args:
+            memory: The shared memory.
+            offset: Where it begins [bytes].
+            size: Most that can be kept [bytes].
+        """
+        self._newest = memory.buf[offset : offset + WORD].cast("q")
+        self._lengths = memory.buf[offset + WORD : offset + 3 * WORD].cast("q")
+        first = offset + 3 * WORD
+        self._slots = [memory.buf[first + slot * size : first + (slot + 1) * size] for slot in range(2)]
+        self._fence = threading.Lock()
+
+    def put(self, content: bytes) -> bool:
+        """Keep this instead of what was kept.
+
+        Args:
+            content: What to keep.
+
+        Returns:
+            False where it is too long.
+        """
+        slot = 1 - self._newest[0]
+        if len(content) > len(self._slots[slot]):
+            return False
+        self._slots[slot][: len(content)] = content
+        self._lengths[slot] = len(content)
+        with self._fence:
+            pass
+        self._newest[0] = slot
+        return True
+
+    def get(self) -> bytes:
+        """What was kept last; nothing at first."""
+        slot = self._newest[0]
+        return bytes(self._slots[slot][: self._lengths[slot]])
+
+    def release(self) -> None:
+        """Let the shared memory go."""
+        for part in (self._newest, self._lengths, *self._slots):
+            part.release()

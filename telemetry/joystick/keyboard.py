@@ -12,10 +12,10 @@ import select
 import sys
 import termios
 import time
-import tty
 from typing import Any
 
 from rtsim.errors import InputError
+from rtsim.terminal import in_foreground, take_keys
 from telemetry.joystick.mapping import DeviceState
 from telemetry.joystick.stick_map import DeviceAxes, DeviceAxis, GamepadMap
 
@@ -95,7 +95,7 @@ class Keyboard:
             )
         self._saved: list[Any] | None = termios.tcgetattr(self._descriptor)
         atexit.register(self.close)
-        tty.setcbreak(self._descriptor)
+        take_keys(self._descriptor, foreign=True)
         self._until: dict[str, float] = {}
         self._lever = 0.0
         self.finished = False
@@ -123,11 +123,13 @@ class Keyboard:
         saved, self._saved = self._saved, None
         if saved is not None:
             atexit.unregister(self.close)
-            termios.tcsetattr(self._descriptor, termios.TCSADRAIN, saved)
+            if in_foreground(self._descriptor, foreign=True):
+                termios.tcsetattr(self._descriptor, termios.TCSADRAIN, saved)
 
     def _keys(self) -> list[str]:
         """Keys since the last look, arrows as their letters."""
-        if not select.select([self._descriptor], [], [], 0.0)[0]:
+        take_keys(self._descriptor, foreign=True)
+        if not in_foreground(self._descriptor, foreign=True) or not select.select([self._descriptor], [], [], 0.0)[0]:
             return []
         text = os.read(self._descriptor, 256).decode(errors="ignore")
         for sequence, letter in _ARROWS.items():

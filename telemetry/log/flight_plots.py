@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rtsim.arrays import FloatArray
+from rtsim.drawing import drawing
 from rtsim.errors import InputError, OutputError
 from rtsim.whole_file import whole_file
 from telemetry.log.reader import FlightLog
@@ -112,10 +113,6 @@ def _write(
     log: FlightLog, target: Path, *, draw: Callable[[FlightLog, Figure], None], size: tuple[float, float]
 ) -> Iterable[Path]:
     """Draw one picture into its files, with a figure of its own: no global state, no window."""
-    import matplotlib as mpl
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     style: dict[Any, Any] = {
         "axes.grid": True,
         "grid.alpha": 0.35,
@@ -123,7 +120,10 @@ def _write(
         "axes.titlesize": 10.0,
         "svg.hashsalt": "rtsim",
     }
-    with mpl.rc_context(style):
+    with drawing(**style):
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         draw(log, figure)

@@ -1,5 +1,7 @@
 """The recording end of the flight log: rows and events go, without loss, to a process that writes them.
 
+A writer that dies is replaced: what it had not confirmed is kept here and given to the next one.
+
 Parquet is written by another process (``telemetry.log.recorder_worker``), since a busy thread in the loop's own process
 costs it half its frames. The rows travel through a pipe in batches of a fiftieth of a second. A live flight never
 waits: what the pipe does not take stays in a backlog here. A headless flight waits for the pipe.
@@ -13,31 +15,53 @@ import json
 import os
 import select
 import struct
-import subprocess
-import sys
 import time
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
-from rtsim.errors import InputError, OutputError
+from rtsim.errors import OutputError
 from rtsim.frame import SIGNAL_COUNT
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import end_process, ending, start_process
 from telemetry.exchange.ring import ROW_WIDTH
-from telemetry.log.format import EVENTS_FILE, FlightMetadata, LogEvent
+from telemetry.log.format import FlightMetadata, LogEvent
+from telemetry.log.place import claim_log
 
 MESSAGE_HEADER = struct.Struct("<cxxxI")
 """Kind and payload length of every message in the pipe."""
 ROWS, EVENT, CLOSE = b"R", b"E", b"C"
 
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How much of a flight stands in its log."""
+
+    parts: int = 0
+    """Parts with rows."""
+    rows: int = 0
+    """Rows in them."""
+    events: int = 0
+    """Events in the events file."""
+    event_bytes: int = 0
+    """Its length [bytes]."""
+
+    def to_json(self) -> str:
+        """As one line."""
+        return json.dumps(asdict(self))
+
+
 _BATCHES_PER_SECOND = 50.0
 """Measured beside a 250 Hz loop: fewer batches make single frames long, more cost more in all."""
 _DRAINS_PER_LOOK = 10
 """How many drains pass between looks at the writer's answers."""
+_MOST_DEATHS = 3
+"""A log whose writers die one after the other, having confirmed nothing, is given up."""
+_ROW_BYTES = 8 * ROW_WIDTH
 _PIPE_BYTES = 1 << 20
 _SET_PIPE_SIZE = 1031  # F_SETPIPE_SZ of Linux, not named in Python 3.11's fcntl everywhere
 
@@ -67,21 +91,23 @@ class Recorder:
         self.rows = 0
         """Rows taken so far."""
         self._live = live
-        self._lock = _create_log_directory(self.path, overwrite=overwrite)
+        self.notes: list[str] = []
+        """What became of the writer and is worth an event of the flight; whoever makes one takes it from here."""
+        self._lock = claim_log(self.path, overwrite=overwrite)
+        self._metadata = metadata
         self._batch = np.full((max(1, round(metadata.rate_hz / _BATCHES_PER_SECOND)), ROW_WIDTH), np.nan)
         self._history = [row[:SIGNAL_COUNT] for row in self._batch]
         self._timing = [row[SIGNAL_COUNT:] for row in self._batch]
         self._fill = 0
         self._drains = 0
         self._backlog: deque[memoryview] = deque()
+        self._confirmed = Progress()
+        self._unconfirmed: dict[bytes, deque[bytes]] = {ROWS: deque(), EVENT: deque()}
+        self._summary: bytes | None = None
+        self._deaths = 0
         self._status = b""
         self._closed = False
-        self._process = _start_worker(self.path, metadata)
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._pipe, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()
-        os.set_blocking(self._pipe, False)
-        os.set_blocking(self._answers, False)
+        self._start_writer()
 
     @property
     def backlog_bytes(self) -> int:
@@ -139,18 +165,13 @@ class Recorder:
         self._closed = True
         self._gather()
         if summary is not None:
-            self._send(CLOSE, json.dumps(dict(summary)).encode())
+            self._summary = json.dumps(dict(summary)).encode()
+            self._send(CLOSE, self._summary)
         try:
-            self._drain(wait_s=timeout_s)
-            self._end_worker(timeout_s)
+            while not self._finish_writer(timeout_s):
+                self._replace_writer()
         finally:
-            if self._process.poll() is None:
-                self._process.kill()
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self._process.wait(1.0)  # one that waits for a dead disk cannot even be killed
-            for stream in (self._process.stdin, self._process.stdout):
-                with contextlib.suppress(OSError):
-                    stream.close()  # type: ignore[union-attr]  # both are pipes
+            end_process(self._process)
             self._lock.close()
         if self.failure is not None:
             raise self.failure
@@ -164,6 +185,8 @@ class Recorder:
     def _send(self, kind: bytes, payload: bytes) -> None:
         if self.failure is None:
             self._backlog.append(memoryview(MESSAGE_HEADER.pack(kind, len(payload)) + payload))
+            if kind in self._unconfirmed:
+                self._unconfirmed[kind].append(payload)
 
     def _drain(self, wait_s: float | None = None) -> None:
         """Write the backlog; wait where the flight is headless, or up to ``wait_s`` without any progress."""
@@ -177,13 +200,12 @@ class Recorder:
             except BlockingIOError:
                 if self._live and wait_s is None:
                     return
-                select.select([], [self._pipe], [], 0.2)
+                select.select([self._answers], [self._pipe], [], 0.2)
                 if wait_s is not None and time.monotonic() - progress > wait_s:
                     self._fail(f"its writer did not move for {wait_s:.0f} s")
                 self._read_answers()
             except OSError:
-                self._read_answers()
-                self._fail("its writer ended unexpectedly")
+                self._replace_writer()
             else:
                 progress = time.monotonic()
                 rest = self._backlog[0][written:]
@@ -193,15 +215,75 @@ class Recorder:
                     self._backlog.popleft()
 
     def _read_answers(self) -> None:
-        """Take what the worker says: nothing while all is well, one JSON line when it cannot write."""
+        """Take what the worker says: how far it is, or why it cannot write."""
         try:
-            data = os.read(self._answers, 4096)
+            data = os.read(self._answers, 1 << 16)
         except (BlockingIOError, OSError):
             return
         self._status += data
-        while b"\n" in self._status:
-            line, self._status = self._status.split(b"\n", 1)
-            self._fail(json.loads(line)["error"])
+        *lines, self._status = self._status.split(b"\n")
+        for line in lines:
+            answer = json.loads(line)
+            if "error" in answer:
+                self._fail(answer["error"])
+            else:
+                self._confirm(Progress(**answer))
+
+    def _confirm(self, progress: Progress) -> None:
+        """Forget what now stands in the log."""
+        before, self._confirmed = self._confirmed, progress
+        self._deaths = 0
+        events, rows = self._unconfirmed[EVENT], self._unconfirmed[ROWS]
+        for _ in range(progress.events - before.events):
+            events.popleft()
+        left = (progress.rows - before.rows) * _ROW_BYTES
+        while left:
+            block = rows.popleft()
+            if len(block) > left:
+                rows.appendleft(block[left:])
+            left = max(0, left - len(block))
+
+    def _start_writer(self) -> None:
+        """Start a writing process, the first or another, and let it go on where the log stands."""
+        self._process = start_process(
+            "telemetry.log.recorder_worker",
+            str(self.path.resolve()),
+            self._confirmed.to_json(),
+            handed=[self._lock.fileno()],  # nobody else writes here before it has ended, should this process be killed
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._pipe, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()
+        with contextlib.suppress(OSError):
+            fcntl.fcntl(self._pipe, _SET_PIPE_SIZE, _PIPE_BYTES)
+        os.set_blocking(self._pipe, False)
+        os.set_blocking(self._answers, False)
+        again, self._status = list(self._unconfirmed.items()), b""
+        self._backlog.clear()
+        self._unconfirmed = {ROWS: deque(), EVENT: deque()}
+        self._send(b"M", self._metadata.to_json().encode())
+        for kind, payloads in again:
+            for payload in payloads:
+                self._send(kind, payload)
+        if self._summary is not None:
+            self._send(CLOSE, self._summary)
+
+    def _replace_writer(self) -> None:
+        """Start another writer for one that died, and say so."""
+        self._read_answers()
+        end_process(self._process, patience_s=1.0)
+        self._deaths += 1
+        if self.failure is not None:
+            return
+        if self._deaths >= _MOST_DEATHS:
+            self._fail(f"its writer ended unexpectedly ({ending(self._process)}), and so did those that replaced it")
+            return
+        text = f"the log's writer ended unexpectedly ({ending(self._process)}); another goes on, nothing is lost"
+        self.notes.append(text)
+        if self._closed:  # nobody makes events any more
+            event = LogEvent(self.rows, self.rows / self._metadata.rate_hz, "log_writer", text, "warning")
+            self._unconfirmed[EVENT].append(event.to_json().encode())
+        self._start_writer()
 
     def _fail(self, reason: str) -> None:
         if self.failure is None:
@@ -211,87 +293,21 @@ class Recorder:
             )
             self._backlog.clear()
 
-    def _end_worker(self, timeout_s: float) -> None:
+    def _finish_writer(self, timeout_s: float) -> bool:
+        """Give the writer the rest and wait for its end; False where it died and another is to go on."""
+        self._drain(wait_s=timeout_s)
+        process = self._process
+        assert process.stdin is not None
         with contextlib.suppress(OSError):
-            self._process.stdin.close()  # type: ignore[union-attr]  # a pipe
-        deadline = time.monotonic() + timeout_s
-        while self._process.poll() is None and time.monotonic() < deadline:
+            process.stdin.close()
+        moved = time.monotonic()
+        while process.poll() is None and time.monotonic() < moved + timeout_s:
+            before = self._confirmed
             select.select([self._answers], [], [], 0.05)
             self._read_answers()
+            if self._confirmed != before:
+                moved = time.monotonic()
         self._read_answers()
-        if self._process.poll() is None:
+        if process.poll() is None:
             self._fail(f"its writer did not finish within {timeout_s:.0f} s")
-        elif self._process.returncode:
-            self._fail("its writer ended unexpectedly")
-
-
-def _create_log_directory(path: Path, *, overwrite: bool) -> BinaryIO:
-    """Make the directory, empty but for the events file, whose lock is held until the log is closed."""
-    try:
-        try:
-            path.mkdir()
-        except FileExistsError:
-            _clear_old_log(path, overwrite=overwrite)
-        events = (path / EVENTS_FILE).open("ab")
-    except OSError as failure:
-        raise OutputError(
-            f"{path}: the log cannot be written here ({failure.strerror}); choose a directory that exists and is yours."
-        ) from failure
-    _lock_or_refuse(events, path)
-    return events
-
-
-def _clear_old_log(path: Path, *, overwrite: bool) -> None:
-    """Remove an earlier log where that was asked for, and nothing else ever."""
-    entries = list(path.iterdir()) if path.is_dir() else []
-    if path.is_dir() and not entries:
-        return
-    if not is_flight_log(path):
-        raise InputError("something that is no rtsim log is here", file=str(path), mend="choose another path")
-    if not overwrite:
-        raise InputError("there is a log here already", file=str(path), mend="choose another path or add --overwrite")
-    with (path / EVENTS_FILE).open("ab") as events:
-        _lock_or_refuse(events, path)
-        for entry in entries:
-            entry.unlink()
-
-
-def is_flight_log(path: Path) -> bool:
-    """Whether a path is a flight log of rtsim and holds nothing else.
-
-    Args:
-        path: The path in question.
-    """
-    if not path.is_dir() or not (path / EVENTS_FILE).is_file():
-        return False
-    return all(entry.name == EVENTS_FILE or "part-" in entry.name for entry in path.iterdir())
-
-
-def _lock_or_refuse(events: BinaryIO, path: Path) -> None:
-    try:
-        fcntl.flock(events, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        events.close()
-        raise InputError(
-            "another flight is writing this log", file=str(path), mend="wait for its end or choose another path"
-        ) from None
-
-
-def _start_worker(path: Path, metadata: FlightMetadata) -> subprocess.Popen[bytes]:
-    """Start the writing process and give it the metadata as its first message."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "telemetry.log.recorder_worker", str(path.resolve())],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env=child_environment(),
-        start_new_session=True,  # Ctrl-C is for the flight; the writer ends when the pipe does
-    )
-    pipe = process.stdin
-    assert pipe is not None
-    with contextlib.suppress(OSError):
-        fcntl.fcntl(pipe.fileno(), _SET_PIPE_SIZE, _PIPE_BYTES)
-    text = metadata.to_json().encode()
-    with contextlib.suppress(OSError):  # a worker that died at once shows at the first drain
-        pipe.write(MESSAGE_HEADER.pack(b"M", len(text)) + text)
-        pipe.flush()
-    return process
+        return self.failure is not None or not process.returncode

@@ -6,6 +6,7 @@ write has failed it goes on reading, so that the flight is never held up, and sa
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import os
@@ -20,24 +21,29 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from rtsim.arrays import FloatArray
-from telemetry.exchange.child_process import lower_priority
+from rtsim.processes import lower_priority
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.log.format import EVENTS_FILE, HEADER_PART, log_schema, part_name
-from telemetry.log.recorder import CLOSE, EVENT, MESSAGE_HEADER, ROWS
+from telemetry.log.recorder import CLOSE, EVENT, MESSAGE_HEADER, ROWS, Progress
 
 LONGEST_WAIT_S = 1.0
 """A row that arrived stands in a finished part after this long, also when simulated time is slow [s]."""
 
 
+NOTHING = Progress()
+"""What stands in a new log."""
+
+
 class PartWriter:
     """Collects rows and writes them as parts, each under a temporary name that is then renamed."""
 
-    def __init__(self, directory: Path, metadata_json: str) -> None:
-        """Write the header part.
+    def __init__(self, directory: Path, metadata_json: str, progress: Progress = NOTHING) -> None:
+        """Write the header part; what an earlier writer had not confirmed comes again and is removed.
 
         Args:
             directory: The log's directory, which exists.
             metadata_json: ``FlightMetadata.to_json()``.
+            progress: What earlier writers have confirmed.
         """
         self._directory = directory
         self._metadata_json = metadata_json
@@ -46,8 +52,15 @@ class PartWriter:
         self._pending: list[FloatArray] = []
         self._pending_rows = 0
         self._oldest = 0.0
-        self._parts = 0
-        self._events = (directory / EVENTS_FILE).open("a", encoding="utf-8")
+        self._parts, self._rows, self._event_count = progress.parts, progress.rows, progress.events
+        for part in directory.glob("part-*.parquet"):
+            if part.name > part_name(self._parts):
+                part.unlink()
+        for unfinished in directory.glob(".part-*.tmp"):
+            unfinished.unlink()
+        self._events = (directory / EVENTS_FILE).open("ab")
+        self._events.truncate(progress.event_bytes)
+        self._events.seek(0, os.SEEK_END)
         self._write(HEADER_PART, log_schema(metadata_json).empty_table())
 
     def rows(self, rows: FloatArray) -> None:
@@ -74,8 +87,14 @@ class PartWriter:
         Args:
             line: ``LogEvent.to_json()``.
         """
-        self._events.write(line + "\n")
+        self._events.write(line.encode() + b"\n")
         self._events.flush()
+        self._event_count += 1
+
+    @property
+    def progress(self) -> Progress:
+        """What stands in the log now."""
+        return Progress(self._parts, self._rows, self._event_count, self._events.tell())
 
     def wait_s(self) -> float | None:
         """Longest time to wait for more before ``flush`` is due [s]; None while nothing is pending."""
@@ -105,6 +124,7 @@ class PartWriter:
         columns = [pa.array(np.ascontiguousarray(rows[:, column])) for column in range(ROW_WIDTH)]
         self._write(part_name(self._parts + 1), pa.Table.from_arrays(columns, schema=self._schema))
         self._parts += 1
+        self._rows += len(rows)
 
     def _write(self, name: str, table: pa.Table) -> None:
         temporary = self._directory / f".{name}.tmp"
@@ -125,7 +145,7 @@ def main() -> int:
     pa.set_cpu_count(1)
     pa.set_io_thread_count(1)
     try:
-        _serve(Path(sys.argv[1]))
+        _serve(Path(sys.argv[1]), Progress(**json.loads(sys.argv[2])))
     except OSError as failure:
         sys.stdout.write(json.dumps({"error": _reason(failure)}) + "\n")
         sys.stdout.flush()
@@ -134,8 +154,8 @@ def main() -> int:
     return 0
 
 
-def _serve(directory: Path) -> None:
-    """Read messages until stdin ends."""
+def _serve(directory: Path, confirmed: Progress) -> None:
+    """Read messages until stdin ends, and confirm what is written."""
     writer: PartWriter | None = None
     data = bytearray()
     while True:
@@ -143,6 +163,7 @@ def _serve(directory: Path) -> None:
         if not select.select([0], [], [], wait)[0]:
             assert writer is not None  # there is no deadline without a writer
             writer.flush()
+            confirmed = _confirm(writer, confirmed)
             continue
         received = os.read(0, 1 << 20)
         if not received:
@@ -156,14 +177,25 @@ def _serve(directory: Path) -> None:
             payload = bytes(data[MESSAGE_HEADER.size : end])
             del data[:end]
             if writer is None:
-                writer = PartWriter(directory, payload.decode())
+                writer = PartWriter(directory, payload.decode(), confirmed)
             else:
                 _handle(writer, kind, payload)
-        if writer is not None and writer.wait_s() == 0.0:
-            writer.flush()
+        if writer is not None:
+            if writer.wait_s() == 0.0:
+                writer.flush()
+            confirmed = _confirm(writer, confirmed)
     if writer is not None:
         writer.flush()
         writer.close()
+
+
+def _confirm(writer: PartWriter, confirmed: Progress) -> Progress:
+    """Tell the flight how far the log is, where that is further than it knows."""
+    progress = writer.progress
+    if progress != confirmed:
+        with contextlib.suppress(OSError):  # it was killed; what came from it is written all the same
+            os.write(1, f"{progress.to_json()}\n".encode())
+    return progress
 
 
 def _handle(writer: PartWriter, kind: bytes, payload: bytes) -> None:

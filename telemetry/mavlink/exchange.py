@@ -5,15 +5,12 @@ Nothing here waits; how, says ``shared_memory``.
 
 from __future__ import annotations
 
-import atexit
 import struct
-from multiprocessing.shared_memory import SharedMemory
 from typing import NamedTuple
 
 from rtsim.command import StickInput
 from rtsim.errors import InputError
-from telemetry.exchange.ring import _attach_untracked
-from telemetry.exchange.shared_memory import WORD, Queue, SequenceLock
+from telemetry.exchange.shared_memory import WORD, Kept, Queue, SequenceLock, SharedMemory
 
 _MAGIC = 0x5254_5349_4D4D_4156
 _HEADER_WORDS = 32
@@ -24,6 +21,7 @@ _TEXT = struct.Struct("<B55s")
 _TEXT_SLOTS = 64
 _NOTE = struct.Struct("<120s")
 _NOTE_SLOTS = 32
+_KEPT_BYTES = 1 << 15
 
 MAGIC, STOP, READY, PORT, HEARTBEAT, PEERS, RECEIVED, DISCARDED, ACCEPTED, SENT, ARMED, FAULTS, ALIVE = range(13)
 """Words of the header: layout check, asked to stop, taking part, own UDP port, life sign, ground stations heard,
@@ -80,53 +78,50 @@ _FEEDBACK_AT = _STICK_AT + WORD * (1 + _STICK_COUNT)
 _REQUESTS_AT = _FEEDBACK_AT + WORD * (1 + _FEEDBACK_COUNT)
 _TEXTS_AT = _REQUESTS_AT + WORD * 2 + _REQUEST_SLOTS * _REQUEST.size
 _NOTES_AT = _TEXTS_AT + WORD * 2 + _TEXT_SLOTS * _TEXT.size
-_SIZE = _NOTES_AT + WORD * 2 + _NOTE_SLOTS * _NOTE.size
+_KEPT_AT = _NOTES_AT + WORD * 2 + _NOTE_SLOTS * _NOTE.size
+_SIZE = _KEPT_AT + WORD * 3 + 2 * _KEPT_BYTES
 
 
 class Exchange:
     """The whole shared memory, from either side."""
 
-    def __init__(self, name: str | None = None) -> None:
-        """Create it, or attach to one.
+    def __init__(self, descriptor: int | None = None) -> None:
+        """Make it, or attach to one.
 
         Args:
-            name: Name of an existing one; None creates it, and removes it at ``close``.
+            descriptor: ``descriptor`` of an existing one, handed to this process; None makes one.
 
         Raises:
-            InputError: There is none of that name, or it has another layout.
+            InputError: There is none, or it has another layout.
         """
-        self._owns = name is None
-        if name is None:
-            self._memory = SharedMemory(create=True, size=_SIZE)
-            assert self._memory.buf is not None
-            self._memory.buf[:_SIZE] = bytes(_SIZE)
+        if descriptor is None:
+            self._memory = SharedMemory(_SIZE)
         else:
             try:
-                self._memory = _attach_untracked(name)
-            except (FileNotFoundError, ValueError) as failure:
-                raise InputError("there is no exchange of this name", key="exchange", value=name) from failure
-        assert self._memory.buf is not None
+                self._memory = SharedMemory(descriptor=descriptor)
+            except (OSError, ValueError) as failure:
+                raise InputError("there is no such exchange", key="exchange", value=descriptor) from failure
         self.header = self._memory.buf[: WORD * _HEADER_WORDS].cast("q")
         """Flags and counters, see the constants of this module."""
-        if self._owns:
+        if descriptor is None:
             self.header[MAGIC] = _MAGIC
         elif self.header[MAGIC] != _MAGIC:
             self.header.release()
             self._memory.close()
-            raise InputError("this shared memory is no exchange of this version", key="exchange", value=name)
+            raise InputError("this shared memory is no exchange of this version", key="exchange", value=descriptor)
         self._stick = SequenceLock(self._memory, _STICK_AT, _STICK_COUNT)
         self._feedback = SequenceLock(self._memory, _FEEDBACK_AT, _FEEDBACK_COUNT)
         self._requests = Queue(self._memory, _REQUESTS_AT, record=_REQUEST, slots=_REQUEST_SLOTS)
         self._texts = Queue(self._memory, _TEXTS_AT, record=_TEXT, slots=_TEXT_SLOTS)
         self._notes = Queue(self._memory, _NOTES_AT, record=_NOTE, slots=_NOTE_SLOTS)
+        self.kept = Kept(self._memory, _KEPT_AT, size=_KEPT_BYTES)
+        """What the MAVLink process would need if it were started again."""
         self._open = True
-        if self._owns:
-            atexit.register(self.close)
 
     @property
-    def name(self) -> str:
-        """Name under which the other side attaches."""
-        return self._memory.name
+    def descriptor(self) -> int:
+        """What the other side attaches to; its process must be handed it."""
+        return self._memory.descriptor
 
     @property
     def stick_version(self) -> int:
@@ -240,17 +235,14 @@ class Exchange:
         return [_text(record[0]) for record in self._notes.take()]
 
     def close(self) -> None:
-        """Detach; the side that created it removes it."""
+        """Let the shared memory go."""
         if not self._open:
             return
         self._open = False
-        for part in (self._stick, self._feedback, self._requests, self._texts, self._notes):
+        for part in (self._stick, self._feedback, self._requests, self._texts, self._notes, self.kept):
             part.release()
         self.header.release()
         self._memory.close()
-        if self._owns:
-            atexit.unregister(self.close)
-            self._memory.unlink()
 
 
 def _text(raw: object) -> str:

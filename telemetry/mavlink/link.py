@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import dataclasses
 import math
 import subprocess
-import sys
 import time
 from array import array
 from collections.abc import Callable
@@ -17,7 +17,7 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.command import StickInput
 from rtsim.errors import OutputError
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import end_process, ending, start_process
 from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import MavlinkConfig, read_signing_key
 from telemetry.mavlink.exchange import (
@@ -42,6 +42,7 @@ RING_ROWS = 256
 _WATCH_PERIOD_S = 0.5
 _MOST_RESTARTS = 3
 _CLOSE_PATIENCE_S = 1.5
+_HANG_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,26 +200,33 @@ class MavlinkLink:
             return
         self._watched = now
         for note in self._exchange.take_notes():
-            if self.on_note is not None:
-                self.on_note(note)
+            self._note(note)
         life_sign = int(self._exchange.header[HEARTBEAT])
         if life_sign != self._life_sign or not self._exchange.header[READY]:
             self._life_sign, self._life_sign_at = life_sign, now
-        hangs = now - self._life_sign_at > 5.0
-        if self._process.poll() is None and not hangs:
-            return
-        if self.restarts >= _MOST_RESTARTS:
-            self._fail()
-            return
-        if hangs:
+        if self._process.poll() is not None:
+            self._replace(f"ended unexpectedly ({ending(self._process)})")
+        elif now - self._life_sign_at > _HANG_S:
             self._process.kill()
-            self._process.wait()
-        self._drop_output()
+            self._replace(f"did not move for {_HANG_S:.0f} s")
+
+    def _replace(self, what: str) -> None:
+        """Start another process, at the same port and with all that the last one knew, and say so."""
+        if self.restarts >= _MOST_RESTARTS:
+            self._fail(f"its process {what} for the {self.restarts + 1}th time; there is no MAVLink any more.")
+            return
+        end_process(self._process, patience_s=1.0)
         self.restarts += 1
-        self._life_sign_at = now
+        self._life_sign_at = time.monotonic()
         self._exchange.header[READY] = 0
         self._ring.skip_unread()
         self._process = self._start()
+        self._note(f"The MAVLink process {what}; another goes on at port {self.port}")
+        self.say("MAVLink process ended; another goes on", severity=4)
+
+    def _note(self, text: str) -> None:
+        if self.on_note is not None:
+            self.on_note(text)
 
     def rest(self) -> None:
         """Say that nothing flies any more, so that nobody misses frames."""
@@ -245,39 +253,31 @@ class MavlinkLink:
         if self._closed:
             return
         self._exchange.header[STOP] = 1
-        try:
-            self._process.wait(_CLOSE_PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        end_process(self._process, patience_s=_CLOSE_PATIENCE_S)
         self._closed = True
         atexit.unregister(self.close)
-        self._drop_output()
         self._ring.close()
         self._exchange.close()
 
     def _start(self) -> subprocess.Popen[bytes]:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "telemetry.mavlink.vehicle_process", self._ring.name, self._exchange.name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=child_environment(),
-            start_new_session=True,  # Ctrl-C is for the flight, which then ends this process in order
-        )
+        shared = (self._ring.descriptor, self._exchange.descriptor)
+        process = start_process("telemetry.mavlink.vehicle_process", *map(str, shared), handed=shared)
         assert process.stdin is not None
+        # The port that stations know stays the vehicle's.
+        config = dataclasses.replace(self.config, bind_port=self.port or self.config.bind_port)
         with contextlib.suppress(OSError):  # a process that died at once shows in `watch`
-            process.stdin.write(self.config.to_json().encode() + b"\n")
-            process.stdin.close()
+            process.stdin.write(config.to_json().encode() + b"\n")
+            process.stdin.flush()
         return process
 
-    def _drop_output(self) -> None:
-        if self._process.stdout is not None:
-            self._process.stdout.close()
+    def _fail(self, otherwise: str = "its process ended unexpectedly.") -> None:
+        """Keep the reason why there is no vehicle, and say it.
 
-    def _fail(self) -> None:
-        """Keep the reason why there is no vehicle."""
+        Args:
+            otherwise: The reason, where the process has not told one.
+        """
         told = b""
         if self._process.stdout is not None and self._process.poll() is not None:
             told = self._process.stdout.read()
-        reason = told.decode(errors="replace").strip() or "its process ended unexpectedly."
-        self.failure = OutputError(f"MAVLink: {reason}")
+        self.failure = OutputError(f"MAVLink: {told.decode(errors='replace').strip() or otherwise}")
+        self._note(str(self.failure))

@@ -100,7 +100,8 @@ class ParameterStore:
         """All parameters; the place is the index."""
         self.index = {parameter.name: place for place, parameter in enumerate(self.declared)}
         """Index by name."""
-        self._values = [parameter.default for parameter in self.declared]
+        self.values = [parameter.default for parameter in self.declared]
+        """Present values by index."""
         for name, value in start.items():
             if self.set(name, value) is None:
                 raise self._refusal(name, value)
@@ -109,7 +110,7 @@ class ParameterStore:
         return len(self.declared)
 
     def __getitem__(self, name: str) -> float:
-        return self._values[self.index[name]]
+        return self.values[self.index[name]]
 
     def at(self, place: int) -> tuple[Parameter, float]:
         """A parameter and its value by index.
@@ -117,7 +118,7 @@ class ParameterStore:
         Args:
             place: From 0 to the number of parameters less 1.
         """
-        return self.declared[place], self._values[place]
+        return self.declared[place], self.values[place]
 
     def set(self, name: str, value: float) -> float | None:
         """Change a value.
@@ -137,14 +138,14 @@ class ParameterStore:
             return None
         if parameter.choices and value != round(value):
             return None
-        self._values[place] = value
+        self.values[place] = value
         return value
 
     def defaults(self) -> None:
         """Put every stored parameter back to its default."""
         for place, parameter in enumerate(self.declared):
             if parameter.stored:
-                self._values[place] = parameter.default
+                self.values[place] = parameter.default
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write what differs from the defaults.
@@ -160,7 +161,7 @@ class ParameterStore:
         lines = ["# Parameters of the rtsim MAVLink vehicle, stored on request of a ground station."]
         lines += [
             f"{parameter.name} = {float(value)!r}"
-            for parameter, value in zip(self.declared, self._values, strict=True)
+            for parameter, value in zip(self.declared, self.values, strict=True)
             if parameter.stored and value != parameter.default
         ]
         write_whole(file, "\n".join(lines) + "\n")
@@ -177,9 +178,9 @@ class ParameterStore:
         if not Path(path).exists():
             return
         values = read_toml(Path(path), noun="parameter", may_be_empty=True)
-        before = list(self._values)
+        before = list(self.values)
         for problem in self.problems(values, file=str(path)):
-            self._values = before
+            self.values = before
             raise problem
 
     @classmethod

@@ -205,6 +205,20 @@ class PeerTable:
         self._admit(peer, now)
         return True
 
+    def take_over(self, address: Address, now: float, *, proved: bool) -> Peer:
+        """Take a station over from another process of this vehicle.
+
+        Args:
+            address: Where it is.
+            proved: It has shown that it hears us.
+        """
+        peer = self.by_address.get(address)
+        if peer is None:
+            peer = self._new(address, now=now)
+            self._admit(peer, now)
+        peer.proved, peer.greeted, peer.last_heard = proved, True, now
+        return peer
+
     def forget_silent(self, now: float) -> None:
         """Drop learned stations and strangers that have been silent too long."""
         for table in (self.by_address, self.strangers):

@@ -103,6 +103,14 @@ class OwnerLock:
         self._last = now
         return True
 
+    def hand_to(self, pilot: PilotId, now: float) -> None:
+        """Make somebody the owner, as of now.
+
+        Args:
+            pilot: Who.
+        """
+        self.owner, self._last = pilot, now
+
     def release_if_silent(self, now: float, *, release_after: float) -> bool:
         """Free the sticks of a silent owner.
 
@@ -147,7 +155,8 @@ class StickReader:
         # The two messages are two sources, and neither touches what the other said: value and time by control.
         self._manual: _Said = {}
         self._override: _Said = {}
-        self._held_down = 0
+        self.held_down = 0
+        """Buttons of the newest MANUAL_CONTROL."""
         self._stream = 0
 
     def forget(self, *, buttons: bool) -> None:
@@ -160,7 +169,7 @@ class StickReader:
         self._override.clear()
         self._stream = 0
         if buttons:
-            self._held_down = 0
+            self.held_down = 0
 
     def manual_control(
         self, message: Any, *, received_ns: int, pilot: PilotId, bipolar: bool, lasts_ns: int
@@ -192,7 +201,7 @@ class StickReader:
         self._manual["switch"] = held["nacelle_aft"] - held["nacelle_forward"], received_ns
         self._manual["trim"] = held["trim_forward"] - held["trim_aft"], received_ns
         self._manual["buttons"] = buttons, received_ns
-        pressed, self._held_down = buttons & ~self._held_down, buttons
+        pressed, self.held_down = buttons & ~self.held_down, buttons
         self._merge(received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
         return [function for function in EDGE_BUTTONS if pressed >> self._buttons[function] & 1]
 

@@ -50,7 +50,8 @@ class FlightState:
     """Highest corridor level of the rows since the last tick."""
     stalled: bool = False
     """Whether the flight's process gives no sign of life though it flies or stands still on purpose."""
-    _before_reset_s: float = 0.0
+    before_reset_s: float = 0.0
+    """Simulated time flown before the last reset [s]."""
     _arrival_s: float = 0.0
     _life_sign: int = 0
     _life_sign_at: float = 0.0
@@ -70,11 +71,11 @@ class FlightState:
         times = rows[:, COLUMN.time_s]
         reset = False
         for time in times.tolist():
-            if self.started and time < self.boot_s - self._before_reset_s:
+            if self.started and time < self.boot_s - self.before_reset_s:
                 # Clients take a clock that jumps back for a reboot, so theirs goes on.
-                self._before_reset_s = self.boot_s + 1.0 / self.rate_hz - time
+                self.before_reset_s = self.boot_s + 1.0 / self.rate_hz - time
                 reset = True
-            self.boot_s = self._before_reset_s + time
+            self.boot_s = self.before_reset_s + time
             self.started = True
         self.row, self.timing = rows[-1, :SIGNAL_COUNT], rows[-1, SIGNAL_COUNT:]
         self.worst_level = max(self.worst_level, int(np.max(rows[:, COLUMN.corridor_level])))

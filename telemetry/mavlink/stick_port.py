@@ -29,8 +29,10 @@ class StickPort:
         """
         self._outbox = outbox
         self._explained = False
-        self._pilot: PilotId | None = None
-        self._bipolar = False
+        self.pilot: PilotId | None = None
+        """Whose sticks came last."""
+        self.bipolar = False
+        """The range of the lever then."""
 
     def take(self, message: Any, frame: Frame, peer: Peer, *, received_ns: int) -> None:
         """Take sticks from whoever holds them.
@@ -62,10 +64,10 @@ class StickPort:
             return
         bipolar = outbox.store[LEVER_RANGE] == 1.0
         silent = received_ns - outbox.reader.sticks.received_ns > lasts_ns
-        if silent or (pilot, bipolar) != (self._pilot, self._bipolar):
+        if silent or (pilot, bipolar) != (self.pilot, self.bipolar):
             # What was held before must not come back with the first packet, nor mean something else in another range.
-            outbox.reader.forget(buttons=pilot != self._pilot)
-            self._pilot, self._bipolar = pilot, bipolar
+            outbox.reader.forget(buttons=pilot != self.pilot)
+            self.pilot, self.bipolar = pilot, bipolar
         if before != outbox.lock.owner:
             outbox.tell(INFO, f"Sticks: {pilot}")
         if manual:

@@ -42,6 +42,7 @@ from telemetry.mavlink.services import Services
 from telemetry.mavlink.signatures import SignatureCheck
 from telemetry.mavlink.state import INPUT_LIVE, INPUT_LOST
 from telemetry.mavlink.stick_port import MANUAL_CONTROL, OVERRIDE, StickPort
+from telemetry.mavlink.succession import Succession
 
 LONGEST_PAUSE_S = 0.02
 """Changes in the flight are noticed at least this often [s]."""
@@ -87,7 +88,9 @@ class Vehicle(Outbox):
         self._identity: tuple[int, ...] = ()
         self._vtol_state = 0
         self._input_state = self._waiting = 0
-        if config.parameter_file:
+        self._succession = Succession(self, self._stick_port)
+        self._resumed = self._succession.take_up(now)
+        if config.parameter_file and not self._resumed:
             self._load_parameters(config.parameter_file)
 
     # Datagrams
@@ -210,7 +213,7 @@ class Vehicle(Outbox):
         Args:
             rows: Full rows, oldest first; may be empty.
         """
-        starts = not self.state.started
+        starts = not self.state.started and not self._resumed
         if self.state.observe(rows, now):
             self.board.say(INFO, "Flight reset")
             starts = True
@@ -256,6 +259,7 @@ class Vehicle(Outbox):
             self.broadcast(dialect.MAVLink_statustext_message(notice.severity, notice.text.encode()))
         header = self.exchange.header
         header[PEERS], header[ARMED] = self.peers.heard, int(self.state.armed)
+        self._succession.put_by()
         listing = any(peer.parameter_next >= 0 for peer in self.peers.by_address.values())
         due = min((peer.schedule.next_due for peer in self.peers.by_address.values()), default=math.inf)
         return min(due, now + (_LIST_PAUSE_S if listing else LONGEST_PAUSE_S))
@@ -330,7 +334,7 @@ class Vehicle(Outbox):
         """Start with stored values; the flight hears of those that differ from what it was told."""
         try:
             self.store.load(path)
-        except InputError as failure:
+        except (InputError, OSError) as failure:
             self.board.say(WARNING, f"Parameters not loaded: {failure}")
             return
         told = ParameterStore(self.config.aids, self.config.parameters)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import os
 import select
 import signal
 import socket
@@ -118,7 +117,7 @@ def open_socket(config: MavlinkConfig) -> socket.socket:
     return sock
 
 
-def serve(config: MavlinkConfig, exchange: Exchange, ring: RingReader, sock: socket.socket) -> None:
+def serve(config: MavlinkConfig, exchange: Exchange, ring: RingReader, sock: socket.socket, *, flight: int = 0) -> None:
     """Be the vehicle until asked to stop, or until the flight's process is gone.
 
     Args:
@@ -126,6 +125,7 @@ def serve(config: MavlinkConfig, exchange: Exchange, ring: RingReader, sock: soc
         exchange: Shared memory to the flight.
         ring: Rows of the flight.
         sock: The vehicle's socket.
+        flight: Descriptor that ends when the flight's process does.
     """
 
     def send(datagram: bytes, address: Address) -> None:
@@ -139,16 +139,17 @@ def serve(config: MavlinkConfig, exchange: Exchange, ring: RingReader, sock: soc
             exchange, vehicle.receive, datagram, address, received_ns=received_ns, now=now
         ),
     )
-    header, parent = exchange.header, os.getppid()
+    header = exchange.header
     header[PORT] = sock.getsockname()[1]
     header[READY] = 1
     due = 0.0
-    while not header[STOP] and os.getppid() == parent:
+    while not header[STOP]:
         pause = max(0.0, due - time.monotonic())
         if receiver.flooded:
             time.sleep(min(max(pause, 0.0005), _FLOOD_PAUSE_S))
-        else:
-            select.select([sock], [], [], pause)
+        waited_for: list[int] = [flight] if receiver.flooded else [sock.fileno(), flight]
+        if flight in select.select(waited_for, [], [], 0.0 if receiver.flooded else pause)[0]:
+            break
         receiver.drain()
         now = time.monotonic()
         header[HEARTBEAT] += 1
@@ -177,10 +178,10 @@ def main() -> int:
     """Serve with the settings on stdin; errors for the user go to stdout as one line."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    ring_name, exchange_name = sys.argv[1:3]
+    ring_descriptor, exchange_descriptor = map(int, sys.argv[1:3])
     config = MavlinkConfig.from_json(sys.stdin.readline())
     try:
-        exchange, ring = Exchange(exchange_name), RingReader(ring_name)
+        exchange, ring = Exchange(exchange_descriptor), RingReader(ring_descriptor)
         try:
             with open_socket(config) as sock:
                 serve(config, exchange, ring, sock)

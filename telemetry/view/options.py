@@ -43,12 +43,3 @@ def display_available() -> bool:
     if sys.platform in {"darwin", "win32"}:
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def partial_name(record: Path) -> Path:
-    """Where a recording grows until it is finished and renamed.
-
-    Args:
-        record: The recording that was asked for.
-    """
-    return record.with_name(f"{record.stem}.partial.rrd")

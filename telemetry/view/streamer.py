@@ -8,7 +8,7 @@ import time
 import warnings
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import rerun as rr
@@ -19,8 +19,9 @@ from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.blueprint import blueprint
 from telemetry.view.corridor import CorridorPlot
 from telemetry.view.instruments import Instruments
-from telemetry.view.options import ViewOptions, partial_name
+from telemetry.view.options import ViewOptions
 from telemetry.view.plots import Plots, history_of, set_row_time
+from telemetry.view.recording import claim_next, partial_name
 from telemetry.view.scene import Scene
 
 APPLICATION = "rtsim"
@@ -31,6 +32,8 @@ FLUSH_PERIOD_S = 0.03
 """What is logged reaches the viewer after at most this long [s]."""
 UNWATCHED_PERIOD_S = 1.0
 """Both periods where nobody watches: every chunk costs more than a kilobyte in the file [s]."""
+SPLIT_S = 600.0
+"""A recording that nobody watches goes on in another file after this long: Rerun takes memory for all of one [s]."""
 
 _SERVER_MEMORY = "256MiB"
 
@@ -50,7 +53,7 @@ def is_whole(recording: Path) -> bool:
 
 
 class Streamer:
-    """Keeps one recording per run of the flight; a reset begins the next."""
+    """Keeps one recording per run of the flight; a reset begins the next, and so does the end of a long one."""
 
     def __init__(
         self, options: ViewOptions, *, outline: CorridorOutline | None, title: str, rate_hz: float, port: int | None
@@ -68,7 +71,10 @@ class Streamer:
         self._stride = max(1, round(rate_hz / options.plot_rate_hz))
         self._host: Any = None
         self._run = 0
+        self._opened = 0.0
         self._files: list[tuple[Path, Path]] = []
+        self._broken: list[Path] = []
+        self._claims: list[BinaryIO] = []
         self._last_time = -math.inf
         self._pending: list[FloatArray] = []
         self._next_plots = 0.0
@@ -90,7 +96,9 @@ class Streamer:
         for piece in np.split(rows, backwards):
             if not len(piece):
                 continue
-            if piece[0, COLUMN.time_s] < self._last_time:
+            started = self._last_time > -math.inf
+            full = self._port is None and started and time.monotonic() - self._opened > SPLIT_S
+            if full or piece[0, COLUMN.time_s] < self._last_time:
                 self._end_run()
                 self._open()
             first = self._last_time == -math.inf
@@ -129,17 +137,13 @@ class Streamer:
             time.sleep(linger_s)
         if self._host is not None:
             self._host.disconnect()
-        broken = []
-        for partial, final in self._files:
-            if is_whole(partial):
-                partial.replace(final)
-            else:
-                broken.append(partial)
-        return broken
+        self._finish_files()
+        return self._broken
 
     def _open(self) -> None:
         """Begin a recording; the first also hosts the server through which all of them reach the viewer."""
         self._run += 1
+        self._opened = time.monotonic()
         suffix = "" if self._run == 1 else f"-{self._run}"
         stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
         recording = rr.RecordingStream(
@@ -156,7 +160,10 @@ class Streamer:
         elif self._port is not None:
             sinks.append(rr.GrpcSink(self.url))
         if self._options.record is not None:
-            final = self._options.record.with_stem(self._options.record.stem + suffix)
+            final = self._options.record
+            if suffix:  # the first is claimed by the flight
+                final, claim = claim_next(final, "-", self._run)
+                self._claims.append(claim)
             partial = partial_name(final)
             self._files.append((partial, final))
             sinks.append(rr.FileSink(str(partial)))
@@ -190,6 +197,20 @@ class Streamer:
             self._recording.flush(timeout_sec=1.0)
         if self._recording is not self._host:
             self._recording.disconnect()
+            if self._host is None:
+                self._finish_files()
+
+    def _finish_files(self) -> None:
+        """Give files that are whole their names."""
+        for partial, final in self._files:
+            if is_whole(partial):
+                partial.replace(final)
+            else:
+                self._broken.append(partial)
+        self._files.clear()
+        for held in self._claims:
+            held.close()
+        self._claims.clear()
 
     def _send_plots(self) -> None:
         if self._pending:

@@ -11,7 +11,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -21,10 +20,11 @@ from typing import Any
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import end_process, ending, start_process
 from telemetry.exchange.ring import Ring
 from telemetry.log.corridor_outline import CorridorOutline
-from telemetry.view.options import ViewOptions, partial_name
+from telemetry.view.options import ViewOptions
+from telemetry.view.recording import claim, claim_next, discard_empty, partial_name
 
 GIVEN_UP = 3
 """Exit code of a worker that has told why it cannot go on: starting it again would not help."""
@@ -32,6 +32,8 @@ START_TIMEOUT_S = 30.0
 """A view that is not ready after this long is given up [s]."""
 
 _ROWS_PER_WATCH = 64
+_LONGEST_THOUGHT_S = 120.0
+"""How long a view that is to close may use the processor without anything to show for it [s]."""
 
 
 class RerunView:
@@ -56,6 +58,7 @@ class RerunView:
             on_message: Called with one sentence whenever something about the view must be told.
 
         Raises:
+            InputError: Something that is not to be replaced is where the recording is to be.
             OutputError: The recording cannot be written where it was asked for.
         """
         self.failure: OutputError | None = None
@@ -68,8 +71,8 @@ class RerunView:
             "title": title,
             "rate_hz": rate_hz,
         }
-        if options.record is not None:
-            _check_writable(options.record)
+        self._claims = [claim(options.record)] if options.record is not None else []
+        self._record = options.record
         self._ring = Ring()
         self._pushes = 0
         self._starts = 0
@@ -148,15 +151,15 @@ class RerunView:
             self._end_process()
             self._note_incomplete("the view could not go on")
         elif code is not None:
-            self._recover(f"The view ended unexpectedly (exit code {code}{self._last_words()})")
+            self._recover(f"The view ended unexpectedly ({ending(self._process)}{self._last_words()})")
         elif now - self._beat_time > patience:
             self._recover(f"The view did not move for {patience:.0f} s" if self._ready else "The view did not start")
 
-    def close(self, timeout_s: float = 3.0) -> None:
-        """Finish recording and view; takes at most ``timeout_s``.
+    def close(self, timeout_s: float = 20.0) -> None:
+        """Finish recording and view, however long that takes while it gets on.
 
         Args:
-            timeout_s: After this the view is ended as it is [s].
+            timeout_s: After this without any sign of progress the view is ended as it is [s].
         """
         if self._closed:
             return
@@ -166,18 +169,35 @@ class RerunView:
             self._order({"close": True})
             with contextlib.suppress(OSError):
                 process.stdin.close()  # type: ignore[union-attr]  # a pipe
-            deadline = time.monotonic() + timeout_s
-            while process.poll() is None and time.monotonic() < deadline:
+            signs, ticks = self._signs_of_progress(), 0
+            moved = wrote = time.monotonic()
+            while process.poll() is None and (now := time.monotonic()) < moved + timeout_s:
                 self._read_answers()
+                if (newest := self._signs_of_progress()) != signs:
+                    signs, moved, wrote = newest, now, now
+                elif (used := _processor_ticks(process.pid)) != ticks and now < wrote + _LONGEST_THOUGHT_S:
+                    ticks, moved = used, now
                 time.sleep(0.005)
             self._read_answers()
             if process.poll() is None:
                 self._end_process()
-                self._tell(f"The view did not close within {timeout_s:.0f} s and was ended.")
+                self._tell(f"The view did not get on with closing for {timeout_s:.0f} s and was ended.")
                 self._note_incomplete("the view did not close in time")
             else:
-                self._release_process()
+                end_process(process)
+                self._stderr.close()
+                self._process = None
         self._ring.close()
+        for held in self._claims:
+            held.close()
+        if self._record is not None:
+            discard_empty(self._record)
+
+    def _signs_of_progress(self) -> tuple[object, ...]:
+        """What changes while the view works: rows taken, bytes written, files finished."""
+        places = (self._record, partial_name(self._record)) if self._record is not None else ()
+        sizes = [place.stat().st_size if place.exists() else -1 for place in places]
+        return (self._ring.consumed, self._ring.heartbeat, *sizes)
 
     def _start(self) -> None:
         """Start the worker and send it the configuration."""
@@ -186,23 +206,19 @@ class RerunView:
         self._beat, self._beat_time = self._ring.heartbeat, time.monotonic()
         options = self._options
         if self._starts > 1 and options.record is not None:
-            options = replace(options, record=options.record.with_stem(f"{options.record.stem}-again{self._starts}"))
+            self._record, held = claim_next(options.record, "-again", self._starts)
+            self._claims.append(held)
+            options = replace(options, record=self._record)
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115  # as long as the process
-        process = subprocess.Popen(
-            [sys.executable, "-m", "telemetry.view.worker"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._stderr,
-            env=child_environment(),
-            start_new_session=True,  # Ctrl-C is for the flight
-        )
+        handed = [self._ring.descriptor, *(held.fileno() for held in self._claims)]  # claims last as long as the worker
+        process = start_process("telemetry.view.worker", handed=handed, stderr=self._stderr)
         self._process = process
         assert process.stdin is not None
         assert process.stdout is not None
         os.set_blocking(process.stdin.fileno(), False)
         os.set_blocking(process.stdout.fileno(), False)
         values = asdict(options) | {"record": str(options.record) if options.record else None}
-        self._order({"options": values, "ring": self._ring.name, **self._configuration})
+        self._order({"options": values, "ring": self._ring.descriptor, **self._configuration})
 
     def _order(self, order: dict[str, Any]) -> None:
         """Send one line; a pipe that is full because nobody reads it loses it."""
@@ -253,27 +269,19 @@ class RerunView:
     def _note_incomplete(self, why: str) -> None:
         if self._options.record is not None and self.failure is None:
             partial = partial_name(self._options.record)
-            rest = f"what there is stands beside it as {partial.name}" if partial.exists() else "nothing was written"
+            written = partial.exists() and partial.stat().st_size
+            rest = f"what there is stands beside it as {partial.name}" if written else "nothing was written"
             self.failure = OutputError(f"{self._options.record}: the recording is incomplete because {why}; {rest}.")
 
     def _end_process(self) -> None:
         """Kill worker and viewer; neither could be asked."""
         process = self._process
         assert process is not None
-        process.kill()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(0.1)  # one that waits for a dead disk cannot even be killed
+        end_process(process)
         if self._viewer_pid is not None:
             with contextlib.suppress(OSError):
                 os.killpg(self._viewer_pid, signal.SIGKILL)
-        self._release_process()
-
-    def _release_process(self) -> None:
-        process = self._process
-        assert process is not None
-        for stream in (process.stdin, process.stdout, self._stderr):
-            with contextlib.suppress(OSError):
-                stream.close()  # type: ignore[union-attr]  # all three are open
+        self._stderr.close()
         self._process = None
 
     def _last_words(self) -> str:
@@ -288,15 +296,10 @@ class RerunView:
             self._on_message(message)
 
 
-def _check_writable(record: Path) -> None:
-    """Refuse a recording that could not be written, before the flight starts."""
+def _processor_ticks(number: int) -> int:
+    """Processor time a process has used [ticks]; 0 where the system does not tell."""
     try:
-        with tempfile.NamedTemporaryFile(dir=record.parent):
-            pass
-        if record.is_dir():
-            raise IsADirectoryError(None, "it is a directory")
-    except OSError as failure:
-        raise OutputError(
-            f"{record}: the recording cannot be written here ({failure.strerror}); "
-            "choose a directory that exists and is yours."
-        ) from failure
+        words = Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        return int(words[11]) + int(words[12])
+    except (OSError, ValueError, IndexError):
+        return 0

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import os
+import shutil
 import subprocess
 import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
 from telemetry.view.options import ViewOptions
+
+_temporary: list[Path] = []
 
 
 class Viewer:
@@ -67,13 +71,26 @@ class Viewer:
 
 def quiet_environment() -> dict[str, str]:
     """An environment in which Rerun keeps its configuration, and its consent to statistics, apart from the user's."""
-    cache = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    directory = Path(cache) / "rtsim" / "viewer"
+    return {**os.environ, "XDG_CONFIG_HOME": str(_configuration())}
+
+
+def remove_temporary() -> None:
+    """Leave no directory behind that was made because there was no place for one."""
+    for directory in _temporary:
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+@functools.cache
+def _configuration() -> Path:
+    """A directory of rtsim's own, or one for the time of this process."""
     try:
+        cache = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+        directory = Path(cache) / "rtsim" / "viewer"
         directory.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # RuntimeError: there is no home
         directory = Path(tempfile.mkdtemp(prefix="rtsim-viewer-"))
-    return {**os.environ, "XDG_CONFIG_HOME": str(directory)}
+        _temporary.append(directory)
+    return directory
 
 
 def _binary() -> str:

@@ -18,12 +18,12 @@ from pathlib import Path
 from typing import Any
 
 from rtsim.errors import RtsimError
-from telemetry.exchange.child_process import lower_priority
+from rtsim.processes import lower_priority
 from telemetry.exchange.ring import RingReader
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions
 from telemetry.view.view import GIVEN_UP
-from telemetry.view.viewer import Viewer, quiet_environment
+from telemetry.view.viewer import Viewer, quiet_environment, remove_temporary
 
 _SMALLEST_FREE_BYTES = 4 << 20
 _VIEWER_START_S = 15.0
@@ -177,5 +177,6 @@ if __name__ == "__main__":
     except BaseException:  # noqa: BLE001  # the flight reads the last line of the traceback
         traceback.print_exc()
         CODE = 1
+    remove_temporary()
     # Rerun's own shutdown can wait for a viewer that does not answer; everything is finished here.
     os._exit(CODE)

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
+import functools
 import json
 import os
+import pty
 import resource
+import select
 import signal
 import subprocess
 import sys
+import termios
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -142,7 +149,13 @@ def test_speeds() -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "code", "words"), [(signal.SIGINT, 130, "Ctrl-C"), (signal.SIGTERM, 143, "SIGTERM")]
+    ("number", "code", "words"),
+    [
+        (signal.SIGINT, 130, "Ctrl-C"),
+        (signal.SIGTERM, 143, "SIGTERM"),
+        (signal.SIGHUP, 129, "SIGHUP"),
+        (signal.SIGQUIT, 131, "SIGQUIT"),
+    ],
 )
 def test_signals_end_the_flight_cleanly(tmp_path: Path, number: int, code: int, words: str) -> None:
     log = tmp_path / "a.parquet"
@@ -159,6 +172,47 @@ def test_signals_end_the_flight_cleanly(tmp_path: Path, number: int, code: int, 
     assert flight.summary["history_sha256"] == answer["history_sha256"] == flight.history_sha256()
     assert len(flight.rows) == answer["frames"]
     assert replay_log(log).same
+
+
+def test_a_closed_terminal_ends_the_flight_with_its_log_closed_and_nohup_does_not(tmp_path: Path) -> None:
+    for ignored, code in ((False, 129), (True, 0)):
+        log = tmp_path / f"{ignored}.parquet"
+        main, child = pty.openpty()
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rtsim", "fly", "--headless", "hover", "--duration", "3", "--log", str(log)],
+            stdin=child,
+            stdout=child,
+            stderr=child,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+            start_new_session=True,
+            preexec_fn=functools.partial(own_terminal, ignored),  # noqa: PLW1509 - it calls into nothing that locks
+        )
+        os.close(child)
+        if ignored:
+            process.send_signal(signal.SIGHUP)
+        drained = threading.Thread(target=drain, args=(main, log / "part-000001.parquet", ignored))
+        drained.start()
+        assert process.wait(120) == code
+        drained.join()
+        summary = read_log(log).summary
+        assert summary is not None
+        assert ("SIGHUP" in summary["end_reason"]) == (not ignored)
+
+
+def own_terminal(ignored: bool) -> None:
+    """Take the terminal as one's own, as a shell does; ignore its end, as nohup does."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    if ignored:
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+
+
+def drain(terminal: int, file: Path, to_the_end: bool) -> None:
+    """Read what a terminal shows, and close it once a file is there."""
+    with contextlib.suppress(OSError):
+        while to_the_end or not file.exists():
+            if select.select([terminal], [], [], 0.02)[0]:
+                os.read(terminal, 4096)
+    os.close(terminal)
 
 
 def test_the_overrun_policy_is_exit_3() -> None:

@@ -15,8 +15,8 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN
+from rtsim.processes import safe_environment
 from scenarios.flight.replay import replay_log
-from telemetry.exchange.child_process import child_environment
 from telemetry.log.reader import read_log
 
 
@@ -76,7 +76,7 @@ def test_sticks_from_the_first_moment_on_and_a_flight_that_stops(tmp_path):
             *(sys.executable, "-m", "rtsim", "fly", "manual_flight", "--pilot", "mavlink", "--headless", "--json"),
             *("--duration", "60", "--log", str(log), "--mavlink", f"127.0.0.1:{ground.socket.getsockname()[1]}"),
         ],
-        env=child_environment() | {"XDG_CONFIG_HOME": str(tmp_path)},
+        env=safe_environment() | {"XDG_CONFIG_HOME": str(tmp_path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

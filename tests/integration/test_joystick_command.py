@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import safe_environment
 from telemetry.exchange.ring import TIMING_COUNT
 from telemetry.mavlink.config import Endpoint, MavlinkConfig
 from telemetry.mavlink.exchange import Feedback
@@ -24,7 +24,7 @@ from telemetry.mavlink.link import MavlinkLink
 def run(*options, **settings):
     return subprocess.run(
         [sys.executable, "-m", "rtsim", "joystick", *options],
-        env=child_environment(),
+        env=safe_environment(),
         capture_output=True,
         text=True,
         timeout=60,
@@ -78,7 +78,7 @@ def test_the_keyboard_flies_a_vehicle():
             *(sys.executable, "-m", "rtsim", "joystick", "--keyboard", "--json"),
             *("--listen", f"127.0.0.1:{port}", "--duration", "20"),
         ],
-        env=child_environment(),
+        env=safe_environment(),
         stdin=slave,
         stdout=subprocess.PIPE,
         stderr=slave,

@@ -14,13 +14,13 @@ import pytest
 
 import scenarios
 from rtsim.cli.main import run
+from rtsim.processes import safe_environment
 from rtsim.protection.monitor import MarginMonitor
 from rtsim.realtime.control import FlightControl
 from scenarios.files.options import Overrides
 from scenarios.flight.limit_watch import LimitWatch
 from scenarios.flight.replay import replay_log
 from scenarios.flight.runner import FlightOutputs
-from telemetry.exchange.child_process import child_environment
 
 LAWS = """
 import time
@@ -215,4 +215,4 @@ def test_the_limit_watch_compiles_nothing_once_rows_come() -> None:
     fresh += "from rtsim.frame import SIGNAL_COUNT; w = LimitWatch('design', print, dt=0.004); "
     fresh += "before = list(watch.signatures); w.rows(np.zeros((10, SIGNAL_COUNT))); "
     fresh += "assert before and list(watch.signatures) == before"
-    subprocess.run([sys.executable, "-c", fresh], env=child_environment(), check=True)
+    subprocess.run([sys.executable, "-c", fresh], env=safe_environment(), check=True)

@@ -130,18 +130,38 @@ def test_reading_is_cheap(open_link):
 def test_a_killed_process_is_replaced_and_sticks_go_on(open_link, ground):
     link = open_link(targets=(ground.endpoint,))
     link.wait_ready()
+    notes = []
     fly(link, 0.2)
+    for message in (
+        dialect.MAVLink_param_set_message(1, 1, b"XV_STK_EXPO", 0.25, dialect.MAV_PARAM_TYPE_REAL32),
+        dialect.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0),
+        dialect.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0),
+    ):
+        ground.send(message, link.port)
+    fly(link, 0.3, first=50)
+    ground.take()
+    link.on_note, port = notes.append, link.port
     os.kill(link._process.pid, signal.SIGKILL)
-    number = 50
+    number = 150
     end = time.monotonic() + 10.0
     while link.restarts == 0 or not link.ready:
         fly(link, 0.1, first=number)
         number += 25
         assert time.monotonic() < end
-    ground.take()
+    assert link.port == port
+    assert notes[-1:] == [f"The MAVLink process ended unexpectedly (ended by SIGKILL); another goes on at port {port}"]
     ground.send(sticks(-400), link.port)
     assert fly(link, 0.2, first=number)[-1].stick == -0.4
-    assert "ATTITUDE" in ground.names()
+    taken = [message for message, _ in ground.take()]
+    texts = [message.text for message in taken if message.get_type() == "STATUSTEXT"]
+    assert "MAVLink process ended; another goes on" in texts
+    assert not [text for text in texts if "Sticks:" in text], "they belong to whom they belonged"
+    assert "ATTITUDE" in [message.get_type() for message in taken]
+    assert [message.base_mode & 128 for message in taken if message.get_type() == "HEARTBEAT"][-1], "still armed"
+    ground.send(dialect.MAVLink_param_request_read_message(1, 1, b"XV_STK_EXPO", -1), link.port)
+    fly(link, 0.3, first=number + 50)
+    values = [message.param_value for message, _ in ground.take() if message.get_type() == "PARAM_VALUE"]
+    assert values == [pytest.approx(0.25)]
     assert link.failure is None
 
 
@@ -170,7 +190,7 @@ def test_the_vehicle_ends_when_the_flight_is_gone(ground):
     import subprocess
     import sys
 
-    from telemetry.exchange.child_process import child_environment
+    from rtsim.processes import safe_environment
 
     code = (
         "import sys, time\n"
@@ -179,7 +199,7 @@ def test_the_vehicle_ends_when_the_flight_is_gone(ground):
         f"link = MavlinkLink(MavlinkConfig(targets=(Endpoint('127.0.0.1', {ground.endpoint.port}),)))\n"
         "link.wait_ready(); print(link._process.pid, flush=True); time.sleep(60)\n"
     )
-    flight = subprocess.Popen([sys.executable, "-c", code], env=child_environment(), stdout=subprocess.PIPE, text=True)
+    flight = subprocess.Popen([sys.executable, "-c", code], env=safe_environment(), stdout=subprocess.PIPE, text=True)
     vehicle = int(flight.stdout.readline())
     flight.kill()
     flight.wait()

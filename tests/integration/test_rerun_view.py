@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,12 +19,14 @@ import pyarrow as pa
 import pytest
 import rerun as rr
 
-from rtsim.errors import EXIT_OUTPUT_FAILED, OutputError
+from rtsim.errors import EXIT_OUTPUT_FAILED, InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.exchange.child_process import child_environment
-from telemetry.exchange.ring import TIMING_COUNT
+from rtsim.processes import safe_environment
+from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT
 from telemetry.log.corridor_outline import CorridorOutline
-from telemetry.view.options import ViewOptions, display_available, partial_name
+from telemetry.view import streamer
+from telemetry.view.options import ViewOptions, display_available
+from telemetry.view.recording import check_recording, partial_name
 from telemetry.view.view import RerunView
 
 OUTLINE = CorridorOutline.from_lines(
@@ -203,8 +206,86 @@ def test_a_view_that_is_frozen_at_the_end_is_ended_in_time(tmp_path: Path, told:
         start = time.monotonic()
         view.close(timeout_s=1.0)
         assert time.monotonic() - start < 2.0
-    assert "did not close within 1 s" in told[0]
+    assert "did not get on with closing for 1 s" in told[0]
     assert view.failure is not None
+
+
+def test_a_view_that_is_slow_to_close_is_waited_for_while_it_gets_on(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    with viewing(ViewOptions(viewer=False, record=record), told) as view:
+        assert view.wait_ready(30.0)
+        assert view._process is not None
+        worker = psutil.Process(view._process.pid)
+        fly(view, rows_of_a_conversion(0.5))
+        worker.suspend()
+        stutter = threading.Thread(target=stutters, args=(worker,))
+        stutter.start()
+        view.close(timeout_s=1.0)  # it takes longer than that, with pauses that are shorter
+        stutter.join()
+    assert told == []
+    assert view.failure is None
+    assert len(values(record, "/plots/speed/kn", "Scalars:scalars")) == 25
+
+
+def stutters(worker: psutil.Process) -> None:
+    """Let a process run for a hundredth of a second in each third, as on a machine that has other things to do."""
+    with contextlib.suppress(psutil.NoSuchProcess):
+        for _ in range(6):
+            time.sleep(0.3)
+            worker.resume()
+            time.sleep(0.01)
+            worker.suspend()
+        worker.resume()
+
+
+def test_two_flights_do_not_record_to_one_file(tmp_path: Path, told: list[str]) -> None:
+    record = tmp_path / "flight.rrd"
+    with viewing(ViewOptions(viewer=False, record=record), told) as view:
+        for refuse in (check_recording, lambda place: RerunView(ViewOptions(viewer=False, record=place))):
+            with pytest.raises(InputError, match="another flight is recording here"):
+                refuse(record)
+        assert view.wait_ready(30.0)
+        fly(view, rows_of_a_conversion(0.2))
+    assert view.failure is None
+    check_recording(record)  # one recording may replace another
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["flight.rrd"]
+
+
+@pytest.mark.parametrize("name", ["flight.rrd", "flight.partial.rrd"])
+def test_what_is_no_recording_is_not_replaced(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match=f"{name}: something that is no recording is here"):
+        RerunView(ViewOptions(viewer=False, record=tmp_path / "flight.rrd"))
+    assert (tmp_path / name).read_text() == "mine"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_further_run_leaves_alone_what_is_no_recording(tmp_path: Path, told: list[str]) -> None:
+    (tmp_path / "flight-2.rrd").write_text("mine")
+    rows = rows_of_a_conversion(0.2)
+    with viewing(ViewOptions(viewer=False, record=tmp_path / "flight.rrd"), told) as view:
+        assert view.wait_ready(30.0)
+        fly(view, rows)
+        fly(view, rows)
+    assert (tmp_path / "flight-2.rrd").read_text() == "mine"
+    assert (tmp_path / "flight-3.rrd").exists()
+
+
+def test_a_long_recording_goes_on_in_another_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(streamer, "SPLIT_S", 0.0)
+    options = ViewOptions(viewer=False, record=tmp_path / "flight.rrd")
+    stream = streamer.Streamer(options, outline=OUTLINE, title="test", rate_hz=250.0, port=None)
+    rows = rows_of_a_conversion(3.0)
+    rows = np.hstack([rows, np.zeros((len(rows), ROW_WIDTH - rows.shape[1]))])
+    stream.take(rows[:250])  # what is empty is not split
+    stream.take(rows[250:500])
+    assert (tmp_path / "flight.rrd").exists(), "the first part has its name already"
+    stream.take(rows[500:])
+    assert stream.close() == []
+    speeds = []
+    for name in ("flight", "flight-2", "flight-3"):
+        speeds += [row[0] for row in values(tmp_path / f"{name}.rrd", "/plots/speed/kn", "Scalars:scalars")]
+    assert speeds == rows[::5, COLUMN.airspeed_kt].tolist()
 
 
 def test_a_missing_viewer_is_told_and_the_recording_goes_on(tmp_path: Path, told: list[str]) -> None:
@@ -297,7 +378,7 @@ def test_the_view_finishes_its_file_and_ends_when_the_flight_is_killed(tmp_path:
         [sys.executable, "-c", script, str(record)],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env=child_environment(),
+        env=safe_environment(),
         text=True,
     ) as flight:
         assert flight.stdout is not None
@@ -326,7 +407,7 @@ def test_a_recording_that_cannot_be_written_to_its_end_keeps_its_partial_name(tm
 
 def test_an_unwritable_recording_is_refused_before_the_flight(tmp_path: Path) -> None:
     for record in (tmp_path / "missing" / "flight.rrd", tmp_path):
-        with pytest.raises(OutputError, match="the recording cannot be written here"):
+        with pytest.raises(OutputError, match="cannot be written"):
             RerunView(ViewOptions(viewer=False, record=record))
 
 

@@ -20,8 +20,8 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN
+from rtsim.processes import safe_environment
 from scenarios.flight.replay import replay_log
-from telemetry.exchange.child_process import child_environment
 from telemetry.log.reader import read_log
 
 pytestmark = pytest.mark.realtime
@@ -41,7 +41,7 @@ class Flight:
 
     def __init__(self, port, folder, *options):
         self.log = folder / "flight.parquet"
-        environment = child_environment() | {"XDG_CONFIG_HOME": str(folder / "config")}
+        environment = safe_environment() | {"XDG_CONFIG_HOME": str(folder / "config")}
         self.process = subprocess.Popen(
             [
                 *(sys.executable, "-m", "rtsim", "fly", "manual_flight", "--pilot", "mavlink", "--headless", "--json"),

@@ -6,6 +6,7 @@ import os
 import pty
 import subprocess
 import sys
+import termios
 import textwrap
 import time
 
@@ -71,7 +72,7 @@ CHILD = textwrap.dedent(
 )
 
 
-@pytest.mark.parametrize("argument", ["end", "fail"])
+@pytest.mark.parametrize("argument", ["end", "fail", "stopped"])
 def test_keys_of_a_terminal_and_its_restoration(argument: str) -> None:
     main, child = pty.openpty()
     process = subprocess.Popen(
@@ -84,6 +85,10 @@ def test_keys_of_a_terminal_and_its_restoration(argument: str) -> None:
     )
     os.close(child)
     text = _read_until(main, "ready")
+    if argument == "stopped":  # what a shell leaves after Ctrl-Z and fg
+        canonical = termios.tcgetattr(main)
+        canonical[3] |= termios.ICANON | termios.ECHO
+        termios.tcsetattr(main, termios.TCSANOW, canonical)
     os.write(main, b" .q")
     text += _read_until(main, "keys")
     process.wait(timeout=20)

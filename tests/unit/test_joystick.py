@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pty
 import socket
+import termios
 import time
 from typing import get_args
 
@@ -242,8 +243,6 @@ def test_lever_keys_are_exact_steps(terminal):
 
 
 def test_the_terminal_is_put_back():
-    import termios
-
     master, slave = pty.openpty()
     before = termios.tcgetattr(slave)
     keyboard = Keyboard(slave)
@@ -252,6 +251,20 @@ def test_the_terminal_is_put_back():
     assert termios.tcgetattr(slave) == before
     os.close(master)
     os.close(slave)
+
+
+def test_a_terminal_that_got_another_mode_gives_keys_again(terminal):
+    """As after Ctrl-Z and ``fg``."""
+    master, keyboard = terminal
+    slave = keyboard._descriptor
+    canonical = termios.tcgetattr(slave)
+    canonical[3] |= termios.ICANON | termios.ECHO
+    termios.tcsetattr(slave, termios.TCSANOW, canonical)
+    os.write(master, b"x")
+    end = time.monotonic() + 30.0
+    while not keyboard.finished and time.monotonic() < end:
+        keyboard.read()
+    assert keyboard.finished
 
 
 def test_without_a_terminal_there_is_no_keyboard():

@@ -16,7 +16,8 @@ from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.command import StickInput
 from rtsim.errors import InputError
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import safe_environment
+from telemetry.exchange.ring import Ring
 from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, Ratings, endpoints, read_signing_key
 from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
 from telemetry.mavlink.framing import frames, signature_time
@@ -33,7 +34,7 @@ KEY = bytes(range(32))
 @pytest.fixture(name="pair")
 def _pair():
     first = Exchange()
-    second = Exchange(first.name)
+    second = Exchange(first.descriptor)
     yield first, second
     second.close()
     first.close()
@@ -75,7 +76,7 @@ WRITER = """
 import sys
 from rtsim.command import StickInput
 from telemetry.mavlink.exchange import STOP, Exchange
-exchange, number = Exchange(sys.argv[1]), 0
+exchange, number = Exchange(int(sys.argv[1])), 0
 while not exchange.header[STOP]:
     number += 1
     value = (number % 1000) / 1000.0
@@ -86,7 +87,11 @@ exchange.close()
 
 def test_a_reader_never_sees_a_torn_value(pair):
     flight = pair[0]
-    writer = subprocess.Popen([sys.executable, "-c", WRITER, flight.name], env=child_environment())
+    writer = subprocess.Popen(
+        [sys.executable, "-c", WRITER, str(flight.descriptor)],
+        env=safe_environment(),
+        pass_fds=[flight.descriptor],
+    )
     seen = set()
     end = time.monotonic() + 120.0  # less than a second where two cores are free
     while len(seen) < 5000 and time.monotonic() < end:
@@ -100,8 +105,12 @@ def test_a_reader_never_sees_a_torn_value(pair):
 
 
 def test_attaching_to_nothing_or_something_else_is_refused():
-    with pytest.raises(InputError, match="no exchange of this name"):
-        Exchange("rtsim_there_is_none")
+    with pytest.raises(InputError, match="no such exchange"):
+        Exchange(-1)
+    ring = Ring(8)
+    with pytest.raises(InputError, match="no exchange of this version"):
+        Exchange(ring.descriptor)
+    ring.close()
 
 
 def packed(message, *, system=255, key=None, link=0, stamp=None):

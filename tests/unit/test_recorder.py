@@ -5,14 +5,17 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -21,11 +24,12 @@ from hypothesis import strategies as st
 
 from rtsim.errors import EXIT_OUTPUT_FAILED, InputError, OutputError
 from rtsim.frame import SIGNAL_COUNT, SIGNALS, history_sha256
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import safe_environment
 from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT
 from telemetry.log import recorder_worker
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.log.format import HEADER_PART, LOG_NAMES, FlightMetadata, LogEvent
+from telemetry.log.place import check_log
 from telemetry.log.reader import read_log
 from telemetry.log.recorder import Recorder
 
@@ -152,7 +156,7 @@ def test_kill_9_in_flight_loses_at_most_a_second(tmp_path: Path) -> None:
         "    time.sleep(max(0.0, start + frame / 250.0 - time.monotonic()))\n"
     )
     with subprocess.Popen(
-        [sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE, env=child_environment(), text=True
+        [sys.executable, "-c", script, str(path)], stdout=subprocess.PIPE, env=safe_environment(), text=True
     ) as process:
         assert process.stdout is not None
         last = 0
@@ -222,15 +226,105 @@ def test_a_full_disk_leaves_finished_parts_and_no_half_one(tmp_path: Path, monke
     assert pq.read_table(tmp_path).num_rows == 50
 
 
-def test_a_writer_that_is_killed_is_reported_and_the_flight_goes_on(tmp_path: Path) -> None:
+def test_writers_that_are_killed_are_replaced_and_the_log_is_whole(tmp_path: Path) -> None:
     path = tmp_path / "flight.parquet"
+    rows = flight(600)
+    events = [LogEvent(100 * number, 2.0 * number, "pilot", f"event {number}") for number in range(6)]
     recorder = Recorder(path, METADATA, live=False)
-    recorder.push_block(flight(100))
+    for number, event in enumerate(events):
+        recorder.event(event)
+        recorder.push_block(rows[100 * number : 100 * number + 100])
+        if number == 1:
+            wait_until((path / "part-000002.parquet").exists)  # something is confirmed, something is not
+        if number in {0, 1, 4}:
+            recorder._process.kill()
+            recorder._process.wait()
+    recorder.close({"end_reason": "done"})
+    log = read_log(path)
+    assert np.array_equal(log.history, rows)
+    assert log.events == tuple(events)
+    assert log.summary == {"end_reason": "done"}
+    assert len(recorder.notes) == 3
+    assert "ended unexpectedly (ended by SIGKILL); another goes on" in recorder.notes[0]
+
+
+@pytest.mark.parametrize("live", [True, False])
+def test_a_writer_that_is_killed_while_the_log_is_closed_is_replaced_and_that_is_an_event(
+    tmp_path: Path, live: bool
+) -> None:
+    path = tmp_path / "flight.parquet"
+    rows = flight(130)
+    recorder = Recorder(path, METADATA, live=live)
+    for row in rows:
+        recorder.push(row)
     recorder._process.kill()
-    recorder._process.wait()
+    recorder.close({"end_reason": "done"})
+    log = read_log(path)
+    assert np.array_equal(log.history, rows)
+    assert [event.kind for event in log.events] == ["log_writer"]
+    assert log.summary == {"end_reason": "done"}
+
+
+def test_writers_that_die_one_after_the_other_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(tmp_path / "flight.parquet", METADATA, live=False)
+    recorder._process.kill()
+    started = recorder._start_writer
+
+    def start_and_kill() -> None:
+        started()
+        recorder._process.kill()
+
+    monkeypatch.setattr(recorder, "_start_writer", start_and_kill)
     recorder.push_block(flight(100))
-    with pytest.raises(OutputError, match="writer ended unexpectedly"):
+    with pytest.raises(OutputError, match="so did those that replaced it"):
         recorder.close({})
+
+
+FLIGHT = """
+import sys, time, numpy as np
+from telemetry.log.format import FlightMetadata
+from telemetry.log.recorder import Recorder
+from rtsim.frame import SIGNAL_COUNT
+recorder = Recorder(sys.argv[1], FlightMetadata('x', '', 'h', 0, 250.0), live=True)
+recorder.push(np.zeros(SIGNAL_COUNT))
+recorder.flush()
+print(recorder._process.pid, flush=True)
+time.sleep(600)
+"""
+
+
+def test_a_writer_that_outlives_its_flight_keeps_others_out_until_it_has_ended(tmp_path: Path) -> None:
+    path = tmp_path / "flight.parquet"
+    with subprocess.Popen(
+        [sys.executable, "-c", FLIGHT, str(path)], stdout=subprocess.PIPE, env=safe_environment(), text=True
+    ) as killed:
+        assert killed.stdout is not None
+        writer = psutil.Process(int(killed.stdout.readline()))
+        wait_until((path / HEADER_PART).exists)
+        writer.suspend()
+        killed.kill()
+    refused(path, "another flight is writing this log")
+    writer.resume()
+    writer.wait(60.0)
+    recorder = Recorder(path, METADATA, live=False, overwrite=True)
+    recorder.push_block(flight(5))
+    recorder.close({})
+    assert len(read_log(path).rows) == 5
+
+
+def refused(path: Path, words: str) -> None:
+    """Both who looks before the flight and who would write refuse."""
+    with pytest.raises(InputError, match=words):
+        check_log(path, overwrite=True)
+    with pytest.raises(InputError, match=words):
+        Recorder(path, METADATA, live=True, overwrite=True)
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60.0
+    while not holds() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert holds()
 
 
 def test_a_stopped_writer_never_delays_a_live_flight(tmp_path: Path) -> None:
@@ -291,6 +385,41 @@ def test_what_is_no_log_is_never_replaced(tmp_path: Path) -> None:
             Recorder(path, METADATA, live=False, overwrite=True)
     assert file.read_text() == "mine"
     assert (directory / "chapter.tex").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["part-2.docx", "part-000001.parquet.bak", "my-part-000001.parquet", "part-1.parquet", ".part-000001.parquet", "x"],
+)
+def test_a_log_with_something_foreign_in_it_is_not_replaced(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "flight.parquet"
+    recorder = Recorder(path, METADATA, live=False)
+    recorder.push_block(flight(5))
+    recorder.close({})
+    (path / name).write_text("mine")
+    before = sorted(path.iterdir())
+    refused(path, f"no rtsim log is here: {re.escape(name)}")
+    assert sorted(path.iterdir()) == before
+
+
+def test_a_folder_named_like_a_part_is_foreign_and_what_a_killed_writer_left_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "flight.parquet"
+    path.mkdir()
+    (path / "_events.jsonl").write_text("")
+    (path / ".part-000001.parquet.tmp").write_text("half a part")
+    check_log(path, overwrite=True)
+    (path / "part-000002.parquet").mkdir()
+    with pytest.raises(InputError, match="part-000002"):
+        check_log(path, overwrite=True)
+
+
+def test_a_log_that_could_not_be_written_is_refused_before_and_nothing_is_changed(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("a file, no directory")
+    for place, error in (("missing/a.parquet", OutputError), ("file/a.parquet", OutputError), ("file", InputError)):
+        with pytest.raises(error):
+            check_log(tmp_path / place, overwrite=True)
+    check_log(tmp_path / "new.parquet", overwrite=False)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
 
 
 def test_two_flights_cannot_write_the_same_log(tmp_path: Path) -> None:

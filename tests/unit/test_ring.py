@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -16,7 +15,7 @@ from hypothesis import strategies as st
 
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_COUNT
-from telemetry.exchange.child_process import child_environment
+from rtsim.processes import safe_environment
 from telemetry.exchange.ring import ROW_WIDTH, TIMING_COUNT, Ring, RingReader
 
 CAPACITY = 8
@@ -30,7 +29,7 @@ def push_numbered(ring: Ring, number: int) -> None:
 @given(st.lists(st.one_of(st.just("read"), st.integers(0, 3 * CAPACITY)), max_size=30))
 def test_rows_keep_order_and_every_row_is_read_or_counted(actions: list[str | int]) -> None:
     ring = Ring(CAPACITY)
-    reader = RingReader(ring.name)
+    reader = RingReader(ring.descriptor)
     pushed, unread, lost = 0, [], 0
     try:
         for action in actions:
@@ -61,7 +60,7 @@ def test_rows_from_a_fast_writer_in_another_process_are_whole_and_in_order() -> 
         "import sys, numpy as np\n"
         "from telemetry.exchange.ring import Ring, SIGNAL_COUNT, TIMING_COUNT\n"
         "ring = Ring(16)\n"
-        "print(ring.name, flush=True)\n"
+        "print(ring.descriptor, flush=True)\n"
         "row, timing = np.empty(SIGNAL_COUNT), np.empty(TIMING_COUNT)\n"
         "sys.stdin.readline()\n"
         "for number in range(60000):\n"
@@ -75,13 +74,15 @@ def test_rows_from_a_fast_writer_in_another_process_are_whole_and_in_order() -> 
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=child_environment(),
+        env=safe_environment(),
         text=True,
     ) as writer:
         assert writer.stdin is not None
         assert writer.stdout is not None
         assert writer.stderr is not None
-        reader = RingReader(writer.stdout.readline().strip())
+        descriptor = os.open(f"/proc/{writer.pid}/fd/{writer.stdout.readline().strip()}", os.O_RDWR)
+        reader = RingReader(descriptor)
+        os.close(descriptor)
         writer.stdin.write("go\n")
         writer.stdin.flush()
         taken: list[float] = []
@@ -100,56 +101,21 @@ def test_rows_from_a_fast_writer_in_another_process_are_whole_and_in_order() -> 
         assert writer.stderr.read() == ""
 
 
-def test_nothing_is_left_behind_without_close(tmp_path: Path) -> None:
-    script = "from telemetry.exchange.ring import Ring\nprint(Ring(8).name)\nring = Ring(8)\nprint(ring.name)\n"
-    result = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script],
-        env=child_environment(),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
-    assert result.stderr == ""
-    for name in result.stdout.split():
-        with pytest.raises(InputError, match="no ring of this name"):
-            RingReader(name)
-
-
-def test_a_killed_writer_leaves_no_memory_behind() -> None:
-    lines = (
-        "import time",
-        "from telemetry.exchange.ring import Ring",
-        "ring = Ring(8)",
-        "print(ring.name, flush=True)",
-    )
-    script = "\n".join((*lines, "print(ring.name, flush=True)", "time.sleep(60)"))
-    with subprocess.Popen(
-        [sys.executable, "-c", script],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env=child_environment(),
-        text=True,
-    ) as writer:
-        assert writer.stdout is not None
-        name = writer.stdout.readline().strip()
-        RingReader(name).close()
-        os.kill(writer.pid, signal.SIGKILL)
-        writer.wait(10)
-    deadline = time.monotonic() + 10.0
-    while Path("/dev/shm", name.lstrip("/")).exists() and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert not Path("/dev/shm", name.lstrip("/")).exists()
+READER = """
+import sys
+from telemetry.exchange.ring import RingReader
+reader = RingReader(int(sys.argv[1]))
+print(len(reader.read()))
+"""
 
 
 def test_a_reader_that_ends_leaves_the_ring_to_its_owner() -> None:
     ring = Ring(8)
-    imported = "from telemetry.exchange.ring import RingReader"
-    script = f"{imported}\nreader = RingReader({ring.name!r})\nprint(len(reader.read()))\n"
     push_numbered(ring, 1)
     result = subprocess.run(
-        [sys.executable, "-W", "error", "-c", script],
-        env=child_environment(),
+        [sys.executable, "-W", "error", "-c", READER, str(ring.descriptor)],
+        env=safe_environment(),
+        pass_fds=[ring.descriptor],
         capture_output=True,
         text=True,
         timeout=60,
@@ -157,10 +123,20 @@ def test_a_reader_that_ends_leaves_the_ring_to_its_owner() -> None:
     )
     assert result.stdout == "1\n"
     push_numbered(ring, 2)
-    reader = RingReader(ring.name)
+    reader = RingReader(ring.descriptor)
     assert reader.read()[:, 0].tolist() == [2.0]
     reader.close()
     ring.close()
+
+
+def test_a_ring_has_no_name_that_could_be_left_behind() -> None:
+    before = set(Path("/dev/shm").iterdir())
+    ring = Ring(8)
+    descriptor = ring.descriptor
+    assert set(Path("/dev/shm").iterdir()) <= before
+    ring.close()
+    with pytest.raises(InputError, match="no such ring"):
+        RingReader(descriptor)
 
 
 def test_replacing_a_stuck_reader_counts_what_it_missed() -> None:
@@ -169,7 +145,7 @@ def test_replacing_a_stuck_reader_counts_what_it_missed() -> None:
         push_numbered(ring, number)
     ring.skip_unread()
     push_numbered(ring, 5)
-    reader = RingReader(ring.name)
+    reader = RingReader(ring.descriptor)
     assert reader.read()[:, 0].tolist() == [5.0]
     assert ring.dropped == 5
     reader.close()
@@ -180,7 +156,7 @@ def test_replacing_a_stuck_reader_counts_what_it_missed() -> None:
 
 def test_the_heartbeat_counts_looks_also_without_rows() -> None:
     ring = Ring(8)
-    reader = RingReader(ring.name)
+    reader = RingReader(ring.descriptor)
     before = ring.heartbeat
     assert len(reader.wait(0.02)) == 0
     assert ring.heartbeat > before

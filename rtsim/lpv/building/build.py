@@ -20,6 +20,7 @@ from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.building.grid import HELICOPTER_SIDE, Grid
 from rtsim.lpv.cells import fill_invalid, quantized
 from rtsim.lpv.database import GRIDDED, Database
+from rtsim.worker_pool import work
 
 Guess = tuple[FloatArray, FloatArray]
 Jacobians = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
@@ -130,14 +131,14 @@ def build_database(
     advance = progress if progress is not None else _ignore
     sides = [side for side in _sides(grid) if side]
     level: list[Row] = [[None] * grid.airspeed.size for _ in range(grid.nacelle.size)]
-    for rows in _run(jobs, _level_side, [(aircraft, grid, side) for side in sides]):
+    for rows in work(_level_side, [(aircraft, grid, side) for side in sides], jobs=jobs):
         for number, row in rows:
             level[number] = row
         advance(0.2 / len(sides))
     arrays = _empty(aircraft, grid)
     tasks = [(aircraft, grid, number, level[number]) for number in range(grid.nacelle.size)]
     for number, layer, v, point, jacobians in _flattened(
-        _run(jobs, _finish_row, tasks), advance, 0.8 / grid.nacelle.size
+        work(_finish_row, tasks, jobs=jobs), advance, 0.8 / grid.nacelle.size
     ):
         cell = (layer, v, number)
         arrays["x_ref"][cell], arrays["u_ref"][cell], arrays["y_ref"][cell] = point.x, point.u, point.y
@@ -165,16 +166,6 @@ def build_database(
 
 def _ignore(share: float) -> None:
     del share
-
-
-def _run(jobs: int, task: Callable[..., Any], arguments: list[tuple[Any, ...]]) -> Iterator[Any]:
-    """Run tasks here or in processes; results come as they are ready."""
-    if jobs == 1:
-        yield from (task(*row) for row in arguments)
-        return
-    from joblib import Parallel, delayed
-
-    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(task)(*row) for row in arguments)
 
 
 def _flattened(

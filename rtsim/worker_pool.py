@@ -1,0 +1,179 @@
+"""Processes of this machine that share a piece of work.
+
+Each is connected by a pair of sockets: there is nothing with a name that could be left behind. A worker ends the moment
+its socket does; the piece of one that died is given to another.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import pickle
+import queue
+import socket
+import subprocess
+import sys
+import threading
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from rtsim.errors import OutputError
+from rtsim.processes import end_process, ending, is_here, start_process
+
+AHEAD = 4
+"""Pieces per worker that may be done before the first of them is taken."""
+MOST_DEATHS = 3
+"""A piece that ended as many workers is given up."""
+
+
+class WorkersDied(OutputError):
+    """One piece ended one worker after the other."""
+
+
+def work(function: Callable[..., Any], pieces: Iterable[tuple[Any, ...]], *, jobs: int) -> Iterator[Any]:
+    """Work on pieces, here or in processes, and give the results in the order of the pieces.
+
+    Args:
+        function: What is done with each; a module has it.
+        pieces: Its arguments, piece by piece.
+        jobs: Processes; 1 works in this one.
+
+    Yields:
+        The results.
+
+    Raises:
+        WorkersDied: A piece ended one worker after the other.
+    """
+    pieces = list(pieces)
+    if jobs == 1 or len(pieces) <= 1:
+        for piece in pieces:
+            yield function(*piece)
+        return
+    pool = _Pool(function, pieces, jobs=min(jobs, len(pieces)))
+    try:
+        yield from pool.results()
+    finally:
+        pool.close()
+
+
+class _Worker:
+    """One process and the socket to it."""
+
+    def __init__(self) -> None:
+        ours, theirs = socket.socketpair()
+        with theirs:
+            self.process = start_process(
+                "rtsim.worker_pool",
+                str(theirs.fileno()),
+                handed=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=2,  # what a law prints must not come between the results of the command
+            )
+        self.connection = Connection(ours.detach())
+        self.piece: int | None = None
+        # What this process can import, a worker can; but nothing stands before what is installed.
+        here = [entry for entry in sys.path if is_here(entry)]
+        self.connection.send([entry for entry in sys.path if entry not in here] + here)
+
+
+class _Pool:
+    """The workers, who has which piece, and what is finished."""
+
+    def __init__(self, function: Callable[..., Any], pieces: list[tuple[Any, ...]], *, jobs: int) -> None:
+        self._function, self._pieces = function, pieces
+        self._todo = deque(range(len(pieces)))
+        self._deaths = [0] * len(pieces)
+        self._done: dict[int, Any] = {}
+        self._workers: list[_Worker] = []
+        self._jobs = jobs
+
+    def results(self) -> Iterator[Any]:
+        self._workers = [_Worker() for _ in range(self._jobs)]
+        for wanted in range(len(self._pieces)):
+            while wanted not in self._done:
+                self._hand_out(wanted)
+                for connection in wait([worker.connection for worker in self._workers if worker.piece is not None]):
+                    self._collect(next(worker for worker in self._workers if worker.connection is connection))
+            result, failure = self._done.pop(wanted)
+            if failure is not None:
+                kind, arguments, attributes, told = failure
+                error = kind.__new__(kind, *arguments)  # its __init__ would compose the sentence a second time
+                error.__dict__.update(attributes)
+                raise error from RuntimeError(f"in a worker process:\n{told}")
+            yield result
+
+    def _hand_out(self, wanted: int) -> None:
+        for worker in self._workers:
+            if worker.piece is None and self._todo and self._todo[0] < wanted + AHEAD * self._jobs:
+                worker.piece = self._todo.popleft()
+                with contextlib.suppress(OSError):  # it died: that shows when its answer is read
+                    worker.connection.send((self._function, self._pieces[worker.piece]))
+
+    def _collect(self, worker: _Worker) -> None:
+        piece = worker.piece
+        assert piece is not None
+        try:
+            self._done[piece] = worker.connection.recv()
+        except (EOFError, OSError):
+            self._replace(worker, piece)
+        else:
+            worker.piece = None
+
+    def _replace(self, worker: _Worker, piece: int) -> None:
+        """Start another for one that died, and let it have the piece."""
+        end_process(worker.process, patience_s=1.0)
+        worker.connection.close()
+        self._deaths[piece] += 1
+        if self._deaths[piece] >= MOST_DEATHS:
+            raise WorkersDied(
+                f"a worker process died ({ending(worker.process)}), and so did {MOST_DEATHS - 1} that replaced it: "
+                "memory ran out, somebody ended them, or the law under test ended its process"
+            )
+        logging.getLogger(__name__).warning(
+            "A worker process died (%s); another does its piece.", ending(worker.process)
+        )
+        self._todo.appendleft(piece)
+        self._workers[self._workers.index(worker)] = _Worker()
+
+    def close(self) -> None:
+        for worker in self._workers:
+            worker.connection.close()
+        for worker in self._workers:
+            end_process(worker.process)
+
+
+def main() -> None:
+    """Be a worker: pieces come and results go through the socket named on the command line."""
+    connection = Connection(int(sys.argv[1]))
+    sys.path[:] = connection.recv()
+    pieces: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def receive() -> None:
+        try:
+            while True:
+                pieces.put(connection.recv_bytes())
+        finally:
+            os._exit(1)  # who started us is gone, or done
+
+    threading.Thread(target=receive, name="pieces", daemon=True).start()
+    while True:
+        try:
+            function, arguments = pickle.loads(pieces.get())
+            answer: tuple[Any, Any] = (function(*arguments), None)
+        except BaseException as error:  # noqa: BLE001 - a law may raise anything
+            told = traceback.format_exc()
+            answer = (None, (type(error), error.args, dict(error.__dict__), told))
+        try:
+            message = pickle.dumps(answer)
+        except Exception as error:  # noqa: BLE001 - whatever cannot be sent
+            told = f"{answer}: {error}"
+            message = pickle.dumps((None, (RuntimeError, (told,), {}, told)))
+        connection.send_bytes(message)
+
+
+if __name__ == "__main__":
+    main()
