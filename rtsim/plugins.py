@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,6 +29,10 @@ class PluginKind:
     """The method its class must have, as people write it."""
     page: str
     """Where that method is described."""
+
+
+_searched: set[str] = set()
+"""Folders in which plug-ins have been looked for."""
 
 
 def find_plugin(name: str, kind: PluginKind) -> Callable[[], Any]:
@@ -86,6 +89,7 @@ def _from_module(name: str, kind: PluginKind) -> Any:
     here = str(Path.cwd())
     if here not in sys.path:
         sys.path.append(here)  # last: what else lies there must not stand in for anything installed
+    _searched.add(here)
     try:
         module = importlib.import_module(module_name)
     except ModuleNotFoundError as error:
@@ -106,7 +110,8 @@ def _from_module(name: str, kind: PluginKind) -> Any:
         ) from error
     target = getattr(module, class_name, None)
     mine = Path(here, f"{module_name}.py")
-    if target is None and mine.exists() and not mine.samefile(getattr(module, "__file__", None) or os.devnull):
+    found = Path(getattr(module, "__file__", None) or "built in")
+    if target is None and mine.exists() and str(found.parent) not in _searched:
         raise InputError(
             f"its module is not found because an installed one is called {module_name} too",
             key=kind.option,
