@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,6 +33,10 @@ class PluginKind:
     """The method its class must have, as people write it."""
     page: str
     """Where that method is described."""
+
+
+_searched: set[str] = set()
+"""Folders in which plug-ins have been looked for."""
 
 
 def find_plugin(name: str, kind: PluginKind) -> Callable[[], Any]:
@@ -91,6 +94,7 @@ def _imported(name: str, folder: str) -> ModuleType:
     """
     if folder not in sys.path:
         sys.path.append(folder)
+    _searched.add(folder)
     first = name.partition(".")[0]
     if first not in sys.modules:
         specification = PathFinder.find_spec(first, [folder])
@@ -130,7 +134,8 @@ def _from_module(name: str, kind: PluginKind) -> Any:
         ) from error
     target = getattr(module, class_name, None)
     mine = Path.cwd() / f"{module_name}.py"
-    if target is None and mine.exists() and not mine.samefile(getattr(module, "__file__", None) or os.devnull):
+    found = Path(getattr(module, "__file__", None) or "built in")
+    if target is None and mine.exists() and str(found.parent) not in _searched:
         raise InputError(
             f"its module is not found because an installed one is called {module_name} too",
             key=kind.option,

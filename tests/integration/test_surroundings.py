@@ -20,12 +20,33 @@ from telemetry.view import viewer
 ROOT = Path(__file__).resolve().parents[2]
 ODD_SETTINGS = "figure.dpi: 7\nfont.size: 99\nsvg.fonttype: odd\nbackend: nonsense\naxes.facecolor: red\n"
 SURROUNDINGS: dict[str, dict[str, str]] = {
-    "terminal": {"TERM": "dumb", "COLUMNS": "abc", "LINES": "-3", "NO_COLOR": "1", "FORCE_COLOR": "1"},
-    "language": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii"},
-    "python": {"PYTHONWARNINGS": "error", "PYTHONHASHSEED": "7", "PYTHONBREAKPOINT": "nonsense"},
-    "numba": {"NUMBA_CAPTURED_ERRORS": "odd", "NUMBA_NUM_THREADS": "0", "NUMBA_OPT": "0", "NUMBA_BOUNDSCHECK": "1"},
-    "pictures": {"MPLBACKEND": "nonsense", "MATPLOTLIBRC": "odd"},
-    "threads": {"OMP_NUM_THREADS": "abc", "TZ": "nonsense/zone", "TMPDIR": "/nonexistent"},
+    "terminal and language": {
+        "TERM": "dumb",
+        "COLUMNS": "abc",
+        "LINES": "-3",
+        "NO_COLOR": "1",
+        "FORCE_COLOR": "1",
+        "TZ": "nonsense/zone",
+        "LC_ALL": "C",
+        "PYTHONUTF8": "0",
+        "PYTHONCOERCECLOCALE": "0",
+        "PYTHONIOENCODING": "ascii",
+    },
+    "python and pictures": {
+        "PYTHONWARNINGS": "error",
+        "PYTHONHASHSEED": "7",
+        "PYTHONBREAKPOINT": "nonsense",
+        "MPLBACKEND": "nonsense",
+        "MATPLOTLIBRC": "odd",
+    },
+    "numba and threads": {
+        "NUMBA_CAPTURED_ERRORS": "odd",
+        "NUMBA_NUM_THREADS": "0",
+        "NUMBA_OPT": "0",
+        "NUMBA_BOUNDSCHECK": "1",
+        "OMP_NUM_THREADS": "abc",
+        "TMPDIR": "/nonexistent",
+    },
 }
 
 

@@ -79,7 +79,7 @@ def die(number: int) -> None:
     os._exit(number)
 
 
-@pytest.mark.parametrize("path", ["", ":", ".", "nowhere:", "{here}"])
+@pytest.mark.parametrize("path", ["", ":.", "nowhere:{here}"])
 def test_helpers_and_workers_import_nothing_of_the_current_folder(
     folder: Path, monkeypatch: pytest.MonkeyPatch, path: str
 ) -> None:
@@ -190,11 +190,9 @@ PARENTS = {
 }
 
 
-@pytest.mark.parametrize("group", [False, True])
-@pytest.mark.parametrize("early", [False, True])
+@pytest.mark.parametrize(("early", "group"), [(True, False), (False, True)])
 @pytest.mark.parametrize("kind", PARENTS)
 def test_nothing_is_left_of_a_killed_process_or_group(tmp_path: Path, kind: str, early: bool, group: bool) -> None:
-    shared = set(Path("/dev/shm").iterdir())
     temporary = tmp_path / "tmp"
     temporary.mkdir()
     flight = subprocess.Popen(
@@ -209,10 +207,11 @@ def test_nothing_is_left_of_a_killed_process_or_group(tmp_path: Path, kind: str,
     helpers = parent.children(recursive=True)
     if not early:
         time.sleep(0.7)  # at work, or nearly
+        for process in (parent, *helpers):
+            assert "/dev/shm" not in Path(f"/proc/{process.pid}/maps").read_text(), "it could be left behind"
     os.killpg(flight.pid, signal.SIGKILL) if group else flight.kill()
     flight.wait(60.0)
     for helper in helpers:
         with contextlib.suppress(psutil.NoSuchProcess):
             helper.wait(60.0)
-    assert set(Path("/dev/shm").iterdir()) <= shared
     assert list(temporary.iterdir()) == []
