@@ -14,6 +14,7 @@ import queue
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
@@ -191,18 +192,16 @@ class Cluster:
                 self._look(own, here)
 
     def _result(self, future: Any, own: Own, here: dict[str, str]) -> Any:
-        from concurrent.futures import CancelledError
-
         while True:
             try:
-                with self._lost_is_told(CancelledError):
-                    return future.result(timeout=POLL_S)
-            except Exception:
+                return future.result(timeout=POLL_S)
+            except Exception as error:
                 if future.status == "error":
                     raise self._failure(future.exception(timeout=WORKERS_WAIT_S), own, here) from None
-                if future.status != "pending":
-                    raise
-                self._look(own, here)  # the worker that had the result is lost: another flies the piece
+                if not isinstance(error, TimeoutError):
+                    with self._lost_is_told(CancelledError):
+                        raise
+                self._look(own, here)  # the way is long, or the worker that had the result is lost: another flies it
 
     def _failure(self, error: Exception, own: Own, here: dict[str, str]) -> Exception:
         """What to tell of a piece that failed in its worker."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import socket
@@ -9,15 +10,21 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 
 import pytest
 from distributed import LocalCluster, Security, get_worker
 
+from rtsim.aircraft import profile
 from rtsim.cli.cluster import cluster_of
 from rtsim.cli.main import run
+from rtsim.cluster import identity as identity_module
+from rtsim.cluster.identity import identity
 from rtsim.cluster.work import Cluster
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, InputError, OutputError
+from rtsim.loop.options import FlightOptions
+from scenarios.campaign.chunks import LawVariant, Task, task_identity
 from tests.certificates import Authority
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
@@ -56,6 +63,11 @@ def second_is_another():
     with suppress(ValueError):
         return {"database": "abc" if get_worker().name != 1 else "def"}
     return {"database": "abc"}
+
+
+async def answer_by_name(own, dask_worker=None):
+    """The same when a worker is asked outside a piece, where it does not know itself otherwise."""
+    return identity(own) | ({"database": "def"} if dask_worker.name == 1 else {})
 
 
 def doubled(value, wait=0.0):
@@ -114,8 +126,10 @@ def test_workers_that_come_late_are_waited_for():
         later.join()
 
 
-def test_a_worker_that_differs_is_named_with_what_differs():
+def test_a_worker_that_differs_is_named_with_what_differs(monkeypatch):
+    monkeypatch.setattr("rtsim.cluster.work.answer", answer_by_name)
     with workers(2) as both, to(both.scheduler_address) as cluster:
+        both.wait_for_workers(2)
         other = both.workers[1].address
         with pytest.raises(InputError, match=rf"{other} has database def instead of abc; give every worker") as told:
             list(cluster.fly(second_is_another, doubled, [(1,)]))
@@ -124,9 +138,7 @@ def test_a_worker_that_differs_is_named_with_what_differs():
 
 @pytest.mark.parametrize("name", ["rtsim", "python", "numba", "kernels", "sources"])
 def test_code_that_differs_is_named(one, monkeypatch, name):
-    from rtsim.cluster import identity
-
-    real = identity._code()
+    real = identity_module._code()
 
     def code():
         with suppress(ValueError):
@@ -134,14 +146,16 @@ def test_code_that_differs_is_named(one, monkeypatch, name):
             return real | {name: "0.0.1"}
         return real
 
-    monkeypatch.setattr(identity, "_code", code)
+    monkeypatch.setattr(identity_module, "_code", code)
     with to(one.scheduler_address) as cluster, pytest.raises(InputError, match=rf"has {name} 0\.0\.1 instead of"):
         list(cluster.fly(nothing_else, doubled, [(1,)]))
 
 
 @pytest.mark.parametrize("looked_at", [True, False])
 def test_a_worker_that_joins_later_is_checked_before_its_figures_count(monkeypatch, hurried, looked_at):
-    if not looked_at:  # then the piece itself refuses
+    if looked_at:
+        monkeypatch.setattr("rtsim.cluster.work.answer", answer_by_name)
+    else:  # then the piece itself refuses
         monkeypatch.setattr(Cluster, "_meet", lambda *_: None)
     with workers(1) as growing, to(growing.scheduler_address) as cluster:
         work = cluster.fly(second_is_another, doubled, [(number, 0.05) for number in range(100)])
@@ -352,3 +366,35 @@ DEK-Info: AES-128-CBC,00112233445566778899AABBCCDDEEFF
 AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA
 -----END EC PRIVATE KEY-----
 """
+
+
+def test_threads_that_ask_first_get_the_same_aircraft(monkeypatch):
+    read = profile.shipped_toml
+
+    def slowly(*names):
+        time.sleep(0.01)  # others come meanwhile
+        return read(*names)
+
+    monkeypatch.setattr(profile, "_xv15_profile", functools.cache(profile._xv15_profile.__wrapped__))
+    monkeypatch.setattr(profile, "shipped_toml", slowly)
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(lambda _: profile.xv15_profile(), range(4)))
+    assert len({id(made) for made in found}) == 1
+
+
+LAW = """class Idle:
+    def step(self, sensors, command, margins, dt):
+        return command, []
+"""
+
+
+def test_a_law_is_known_as_it_was_loaded(tmp_path):
+    law = tmp_path / "law_of_a_cluster.py"
+    law.write_text(LAW, encoding="utf-8")
+    task = Task("", "", (LawVariant("law_of_a_cluster:Idle"),), 0, FlightOptions(), str(tmp_path))
+    loaded = task_identity(task)
+    assert "law law_of_a_cluster:Idle" in loaded
+    law.write_text(LAW + "# another\n", encoding="utf-8")
+    assert task_identity(task) == loaded  # what flies is what was loaded
+    missing = Task("", "", (LawVariant("law_of_nobody:Idle"),), 0, FlightOptions(), str(tmp_path))
+    assert "law_of_nobody" in task_identity(missing)["laws"]
