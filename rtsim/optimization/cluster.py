@@ -49,15 +49,20 @@ class ClusterEvaluator:
     """Spreads each generation over the workers of a cluster; order and values do not depend on who flies what."""
 
     def __init__(self, problem: ConversionProblem, cluster: Cluster) -> None:
-        """Take a cluster.
+        """Take a cluster, once it has workers and they are known.
 
         Args:
             problem: What is searched.
             cluster: Who flies.
+
+        Raises:
+            InputError: A worker is not like this process.
+            OutputError: There are no workers in time.
         """
         self._cluster = cluster
         self._spec_json, self._hash = problem.spec.model_dump_json(), problem.database_hash
         self._own = partial(search_identity, problem.spec.flight.database)
+        cluster.threads(self._own)
 
     def evaluate(self, variables: FloatArray) -> Evaluation:
         """Fly candidates.

@@ -103,6 +103,17 @@ def test_two_processes_give_the_same(alone):
     same(alone, flown(LocalExecutor(2)))
 
 
+class Backwards(LocalExecutor):
+    def fly(self, task, chunks):
+        yield from reversed(list(super().fly(task, chunks)))
+
+
+def test_pieces_may_be_finished_in_any_order(alone, tmp_path):
+    options = CampaignOptions(early_stop=False, folder=tmp_path)
+    same(alone, run_campaign(*campaign(), options=options, executor=Backwards(1)))
+    assert len(list((tmp_path / "chunks").glob("*.npz"))) == len(plan_chunks(campaign()[0], None))
+
+
 def test_a_run_does_not_depend_on_what_was_flown_before_it(alone):
     spec, _ = campaign()
     bench = Bench()
