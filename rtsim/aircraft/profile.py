@@ -14,6 +14,7 @@ import hashlib
 import itertools
 import json
 import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -174,9 +175,18 @@ class AircraftProfile:
         return len(self.borrowed) == len(PARTS) or self is xv15_profile()
 
 
-@cache
+_MAKING = threading.Lock()
+
+
 def xv15_profile() -> AircraftProfile:
-    """The XV-15's profile, from its folder."""
+    """The XV-15's profile: one object, whatever thread asks first."""
+    with _MAKING:
+        return _xv15_profile()
+
+
+@cache
+def _xv15_profile() -> AircraftProfile:
+    """From its folder."""
     document = shipped_toml(XV15_DATA, "profile.toml")
     parts: dict[str, Any] = {}
     for part in PARTS:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
@@ -19,7 +20,6 @@ from rtsim.jsonable import to_jsonable
 from rtsim.whole_file import check_writable, whole_file, write_whole
 
 if TYPE_CHECKING:
-    from scenarios.campaign.executors import Executor
     from scenarios.campaign.run import CampaignResult
 
 
@@ -50,9 +50,8 @@ def run_campaign_command(
     no_early_stop: Annotated[
         bool, typer.Option("--no-early-stop", help="Fly everything, though the verdict may be certain before.")
     ] = False,
-    dask: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler to fly on.", show_default="this machine")
-    ] = None,
+    dask: DaskAddress = None,
+    dask_tls: DaskTls = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -69,6 +68,7 @@ def run_campaign_command(
         if file is not None:
             check_writable(file, folder=folder)
     from scenarios.campaign.chunks import plan_chunks
+    from scenarios.campaign.executors import DaskExecutor, LocalExecutor
     from scenarios.campaign.run import CampaignOptions, run_campaign
     from scenarios.campaign.spec import load_campaign
 
@@ -89,7 +89,9 @@ def run_campaign_command(
         fresh=fresh,
     )
     planned = sum(chunk.count for chunk in plan_chunks(campaign, runs))
-    with _executor(dask, jobs) as executor, _watched(planned, resumable=out is not None) as watch:
+    goes_on = "the same command goes on" if out is not None else "with --out FOLDER it could go on later"
+    with cluster_of(dask, dask_tls, jobs, goes_on) as cluster, _watched(planned, goes_on) as watch:
+        executor = LocalExecutor(jobs or os.cpu_count() or 1) if cluster is None else DaskExecutor(cluster)
         result = run_campaign(campaign, text, options=asked, executor=executor, file=str(spec), on_progress=watch)
     report = result.report()
     if out is not None:
@@ -105,24 +107,7 @@ def run_campaign_command(
 
 
 @contextmanager
-def _executor(dask: str | None, jobs: int | None) -> Iterator[Executor]:
-    """Who flies: processes here, or a cluster."""
-    from scenarios.campaign.executors import DaskExecutor, LocalExecutor
-
-    if dask is None:
-        yield LocalExecutor(jobs or os.cpu_count() or 1)
-        return
-    if jobs is not None:
-        raise InputError("has no meaning on a cluster", key="--jobs", value=jobs, mend="leave it out with --dask")
-    cluster = DaskExecutor(dask)
-    try:
-        yield cluster
-    finally:
-        cluster.close()
-
-
-@contextmanager
-def _watched(planned: int, *, resumable: bool) -> Iterator[Callable[[int, int], None]]:
+def _watched(planned: int, goes_on: str) -> Iterator[Callable[[int, int], None]]:
     """Progress as runs end; on Ctrl-C, how to go on."""
     shown = 0
     with progress("Flying", total=planned) as advance:
@@ -136,8 +121,7 @@ def _watched(planned: int, *, resumable: bool) -> Iterator[Callable[[int, int], 
         try:
             yield watch
         except KeyboardInterrupt:
-            how = "the same command goes on" if resumable else "with --out FOLDER it could go on later"
-            console.print(f"Stopped after {shown} of {planned} runs; {how}.")
+            console.print(f"Stopped after {shown} of {planned} runs; {goes_on}.")
             raise
 
 

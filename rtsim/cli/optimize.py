@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
 from rtsim.whole_file import check_writable, write_whole
 
 if TYPE_CHECKING:
+    from rtsim.cluster.work import Cluster
     from rtsim.optimization.path import ConversionPath
     from rtsim.optimization.problem import ConversionProblem
-    from rtsim.optimization.search import Evaluator, Progress, SearchResult
+    from rtsim.optimization.search import Progress, SearchResult
     from rtsim.optimization.spec import SearchSpec
 
 _OWN = "the specification's"
@@ -64,9 +66,8 @@ def optimize_command(
     jobs: Annotated[
         int | None, typer.Option(help="Threads that fly.", show_default="one per core", min=1, max=256)
     ] = None,
-    dask: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler to fly on.", show_default="this machine")
-    ] = None,
+    dask: DaskAddress = None,
+    dask_tls: DaskTls = None,
     out: Annotated[Path | None, typer.Option(help="Scenario file to write.", show_default="NAME.toml here")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the record beside the scenario file.")] = False,
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave the nonlinear check flight out.")] = False,
@@ -98,7 +99,8 @@ def optimize_command(
     from rtsim.optimization.problem import ConversionProblem
 
     problem = ConversionProblem(chosen, workers=jobs)
-    result = _search(problem, dask, record_file, resume=resume)
+    with cluster_of(dask, dask_tls, jobs, "the same command with --resume goes on") as cluster:
+        result = _search(problem, cluster, record_file, resume=resume)
     summary = _save(problem, result, scenario_file, record_file, check=not no_check and not result.interrupted)
     if json:
         emit_json(summary)
@@ -123,20 +125,13 @@ def _specification(file: Path | None, like: str | None, changes: dict[str, Any])
     return checked_spec(base.model_dump(), changes)
 
 
-def _search(problem: ConversionProblem, address: str | None, record_file: Path, *, resume: bool) -> SearchResult:
+def _search(problem: ConversionProblem, cluster: Cluster | None, record_file: Path, *, resume: bool) -> SearchResult:
+    from rtsim.optimization.cluster import ClusterEvaluator
     from rtsim.optimization.search import run_search
 
-    with _evaluator(problem, address) as evaluator, _progress_bar(problem.spec.search.generations) as told:
+    evaluator = None if cluster is None else ClusterEvaluator(problem, cluster)
+    with _progress_bar(problem.spec.search.generations) as told:
         return run_search(problem, evaluator=evaluator, record_path=record_file, resume=resume, on_progress=told)
-
-
-def _evaluator(problem: ConversionProblem, address: str | None) -> Any:
-    if address is None:
-        evaluator: Evaluator | None = None
-        return nullcontext(evaluator)
-    from rtsim.optimization.cluster import ClusterEvaluator
-
-    return ClusterEvaluator(problem, address)
 
 
 @contextmanager

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import functools
+import hashlib
+import importlib
+import inspect
 import logging
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
+from rtsim.cluster.identity import found_or_told
 from rtsim.errors import InputError
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
@@ -185,6 +190,46 @@ def law_chain(name: str, folder: str, boundary: CorridorName = "flight", databas
 @functools.lru_cache(maxsize=8)
 def _python_laws(name: str, folder: str, boundary: CorridorName, database: str) -> Sequence[LawSpec]:
     return law_chain(name, folder, boundary, database)
+
+
+def law_code(task: Task) -> dict[str, str]:
+    """Hash of the modules of laws written in Python, as they were loaded: a changed law is another law.
+
+    Args:
+        task: The campaign.
+
+    Raises:
+        InputError: There is no such law.
+    """
+    found = {}
+    for law in task.laws:
+        if law.compiled:
+            continue
+        law_chain(law.name, task.folder)
+        for part in law.name.split(","):
+            if ":" in part:
+                found[part.strip()] = _code_hash(importlib.import_module(part.strip().partition(":")[0]))
+    return found
+
+
+@functools.cache
+def _code_hash(module: ModuleType) -> str:
+    """Of a module as it was when it was first asked for: what its file says later is not what flies."""
+    return hashlib.sha256(inspect.getsource(module).encode()).hexdigest()
+
+
+def task_identity(task: Task) -> dict[str, str]:
+    """What a campaign needs to be the same wherever it is flown, besides rtsim: its aircraft and its laws.
+
+    Args:
+        task: The campaign.
+    """
+    database = task.options.database or None
+    found = {"database": found_or_told(lambda: load_database(database).aircraft_hash)}
+    try:
+        return found | {f"law {name}": code for name, code in law_code(task).items()}
+    except InputError as error:
+        return found | {"laws": str(error).rstrip(".")}
 
 
 @functools.lru_cache(maxsize=4)

@@ -1,4 +1,4 @@
-"""Who does the work of a campaign: this process, processes of this machine, or a Dask cluster; always in order.
+"""Who does the work of a campaign: this process, processes of this machine, or a Dask cluster.
 
 Legend:
     task: The campaign.
@@ -7,21 +7,18 @@ Legend:
 
 from __future__ import annotations
 
-import contextlib
-import warnings
 from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from functools import partial
+from typing import Protocol
 
-from rtsim.errors import InputError, OutputError
+from rtsim.cluster.work import Cluster
+from rtsim.errors import OutputError
 from rtsim.worker_pool import WorkersDied, work
-from scenarios.campaign.chunks import Chunk, ChunkResult, Task, fly_chunk
-
-CONNECT_TIMEOUT_S = 10.0
-"""How long a Dask scheduler may take to answer [s]."""
+from scenarios.campaign.chunks import Chunk, ChunkResult, Task, fly_chunk, task_identity
 
 
 class Executor(Protocol):
-    """Flies pieces and gives them back in the order in which they were asked for."""
+    """Flies pieces and gives each back as it is finished."""
 
     def fly(self, task: Task, chunks: Sequence[Chunk]) -> Iterator[ChunkResult]:
         """Fly pieces; the iterator may be closed before its end."""
@@ -54,49 +51,21 @@ class LocalExecutor:
 class DaskExecutor:
     """A Dask cluster; pieces lost with a worker are flown again by another."""
 
-    def __init__(self, address: str) -> None:
-        """Connect.
+    def __init__(self, cluster: Cluster) -> None:
+        """Take a cluster.
 
         Args:
-            address: The scheduler, such as ``tcp://host:8786``.
-
-        Raises:
-            InputError: Dask is not installed.
-            OutputError: Nobody answers there.
+            cluster: The cluster.
         """
-        try:
-            from distributed import Client
-        except ImportError as error:
-            raise InputError(
-                "Dask is not installed", key="--dask", value=address, mend="pip install 'rtsim[cluster]'"
-            ) from error
-        connect: Any = Client  # partly typed, and absent where only the checker runs
-        try:
-            self._client = connect(address, timeout=CONNECT_TIMEOUT_S)
-        except (OSError, ValueError) as error:
-            raise OutputError(f"--dask {address}: no Dask scheduler answers there.") from error
+        self._cluster = cluster
 
     def fly(self, task: Task, chunks: Sequence[Chunk]) -> Iterator[ChunkResult]:
-        """Fly pieces in order.
+        """Fly pieces; each is given back as it is finished.
 
         Raises:
-            OutputError: The cluster gave up a piece.
+            InputError: A worker is not like this process.
+            OutputError: The cluster is lost.
         """
-        from distributed import KilledWorker
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the size of what is sent: a campaign file, once
-            futures = [self._client.submit(fly_chunk, task, chunk, pure=False, retries=2) for chunk in chunks]
-        try:
-            for future in futures:
-                try:
-                    yield future.result()
-                except KilledWorker as error:
-                    raise OutputError(f"the Dask cluster lost its workers: {error}") from error
-        finally:
-            self._client.cancel(futures)
-
-    def close(self) -> None:
-        """Disconnect; the cluster goes on."""
-        with contextlib.suppress(OSError):
-            self._client.close()
+        pieces = [(task, chunk) for chunk in chunks]
+        for _, result in self._cluster.fly(partial(task_identity, task), fly_chunk, pieces):
+            yield result

@@ -11,17 +11,18 @@ from typing import Any
 
 import numpy as np
 
-import rtsim
 from rtsim.errors import InputError
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metric_kernels import VALUE
+from rtsim.versions import versions
 from scenarios.campaign.chunks import (
     ChunkResult,
     LawVariant,
     Task,
     law_chain,
+    law_code,
     plan_chunks,
     present_folder,
 )
@@ -169,6 +170,7 @@ def run_campaign(
     if options.folder is not None:
         store = Store(options.folder, identity(task), fresh=options.fresh)
     finished = {} if store is None else {chunk: found for chunk in chunks if (found := store.load(chunk)) is not None}
+    reused = len(finished)
     begin = time.perf_counter()
     missing = [chunk for chunk in chunks if chunk not in finished]
     work = (executor or LocalExecutor(1)).fly(task, missing)
@@ -177,12 +179,12 @@ def run_campaign(
     stopped = False
     try:
         for chunk in chunks:
-            result = finished.get(chunk)
-            if result is None:
+            while chunk not in finished:
                 result = next(work)
+                finished[result.chunk] = result
                 if store is not None:
                     store.save(result)
-            results.append(result)
+            results.append(finished[chunk])
             if on_progress is not None:
                 on_progress(sum(item.chunk.count for item in results), sum(planned))
             judged = judge(_flights(spec, task.laws, results, planned), final=False)
@@ -207,7 +209,7 @@ def run_campaign(
             for run, law, words in item.problems
         ),
         stopped_early=stopped,
-        reused=len(finished),
+        reused=reused,
         wall_s=time.perf_counter() - begin,
         cpu_s={law.label: float(sum(item.seconds[place] for item in results)) for place, law in enumerate(task.laws)},
     )
@@ -264,36 +266,17 @@ def identity(task: Task) -> dict[str, Any]:
     Args:
         task: The campaign.
     """
-    from scenarios.flight.flight_setup import versions
-
     return {
         "campaign": hashlib.sha256(task.text.encode()).hexdigest(),
         "laws": [law.label for law in task.laws],
-        "law_code": _law_code(task.laws, task.folder),
+        "law_code": law_code(task),
         "seed": task.seed,
         "plant": task.options.plant,
         "rate_hz": task.options.rate_hz,
         "metrics": list(VALUE.asdict()),
         "database": task.aircraft_hash,
-        "versions": versions() | {"rtsim": rtsim.__version__},
+        "versions": versions(),
     }
-
-
-def _law_code(laws: Sequence[LawVariant], folder: str) -> dict[str, str]:
-    """Hash of the modules of laws written in Python: a changed law is another law."""
-    import importlib
-    import inspect
-
-    found = {}
-    for law in laws:
-        if law.compiled:
-            continue
-        law_chain(law.name, folder)
-        for part in law.name.split(","):
-            if ":" in part:
-                module = importlib.import_module(part.strip().partition(":")[0])
-                found[part.strip()] = hashlib.sha256(inspect.getsource(module).encode()).hexdigest()
-    return found
 
 
 def _flights(

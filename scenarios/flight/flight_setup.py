@@ -1,16 +1,13 @@
-"""What a scenario means to the simulation, and how that is kept for a replay: setup, frames, outline, versions."""
+"""What a scenario means to the simulation, and how that is kept for a replay: setup, frames, outline."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import platform
-import sys
 from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter
 
-import rtsim
 from rtsim.loop.simulation import FlightSetup
 from rtsim.lpv.files.storage import load_database
 from rtsim.programme import Programme
@@ -91,18 +88,3 @@ def setup_from_json(values: dict[str, Any]) -> FlightSetup:
 def _json_form(name: str) -> TypeAdapter[Any]:
     """How a field of the setup is written to JSON and read back, from its type."""
     return TypeAdapter(get_type_hints(FlightSetup)[name])
-
-
-def versions() -> dict[str, str]:
-    """Versions and machine type that a history hash is promised for."""
-    import numba
-    import numpy as np
-
-    return {
-        "rtsim": rtsim.__version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "numba": numba.__version__,
-        "machine": f"{platform.system()} {platform.machine()}",
-        "byteorder": sys.byteorder,
-    }

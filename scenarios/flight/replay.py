@@ -20,8 +20,9 @@ from rtsim.loop.options import declared
 from rtsim.loop.simulation import MODES, Simulation
 from rtsim.outside import understanding
 from rtsim.protection.tables import LAW_NAMES
+from rtsim.versions import versions
 from scenarios.files.disturbances import DISTURBANCE_KINDS, disturbance_from_event
-from scenarios.flight.flight_setup import setup_from_json, versions
+from scenarios.flight.flight_setup import setup_from_json
 from telemetry.log.format import EVENTS_FILE, LogEvent
 from telemetry.log.reader import FlightLog, read_log
 

@@ -23,11 +23,12 @@ from rtsim.realtime.control import FlightControl, checked_speed
 from rtsim.realtime.executive import Executive
 from rtsim.realtime.policy import OverrunPolicy
 from rtsim.realtime.report import TimingReport
+from rtsim.versions import versions
 from scenarios.files.loader import load_scenario
 from scenarios.files.nacelle_laws import load_nacelle_law
 from scenarios.files.options import Overrides, with_overrides
 from scenarios.files.scenario import Scenario
-from scenarios.flight.flight_setup import corridor_outline, flight_frames, flight_setup, replay_setup, versions
+from scenarios.flight.flight_setup import corridor_outline, flight_frames, flight_setup, replay_setup
 from scenarios.flight.hands import Hands
 from scenarios.flight.limit_watch import LimitWatch
 from scenarios.flight.mavlink_options import MavlinkOptions, flown_by_hand, mavlink_config, refuse_unpaced

@@ -17,9 +17,9 @@ from rtsim.errors import OutputError
 from rtsim.jsonable import to_jsonable
 from rtsim.loop.options import FlightOptions, declared
 from rtsim.protection.tables import LAW_NAMES
+from rtsim.versions import versions
 from scenarios.files.loader import parse_scenario
 from scenarios.files.scenario import Scenario
-from scenarios.flight.flight_setup import versions
 from scenarios.flight.runner import FlightOutputs, fly
 from scenarios.verdicts.tester import Case
 

@@ -10,8 +10,9 @@ import time
 import numpy as np
 import pytest
 
-from rtsim.errors import InputError
-from rtsim.optimization.cluster import ClusterEvaluator, evaluate_here
+from rtsim.cluster.work import Cluster
+from rtsim.lpv.files.storage import load_database
+from rtsim.optimization.cluster import ClusterEvaluator, evaluate_here, search_identity
 from rtsim.optimization.problem import ConversionProblem
 from rtsim.optimization.search import run_search
 from rtsim.optimization.spec import checked_spec
@@ -29,7 +30,7 @@ def cluster():
     from distributed import LocalCluster
 
     with LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1"
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", host="127.0.0.1"
     ) as made:
         yield made
 
@@ -49,8 +50,8 @@ def test_a_search_on_a_cluster_ends_as_a_local_one_though_a_worker_is_killed(pro
             killed.append(threading.Thread(target=later))
             killed[0].start()
 
-    with ClusterEvaluator(problem, cluster.scheduler_address) as evaluator:
-        there = run_search(problem, evaluator=evaluator, on_progress=kill_one)
+    with Cluster(cluster.scheduler_address, goes_on="") as connected:
+        there = run_search(problem, evaluator=ClusterEvaluator(problem, connected), on_progress=kill_one)
     killed[0].join()
     assert there.history == here.history
     assert np.array_equal(there.best, here.best)
@@ -61,31 +62,22 @@ def test_a_search_on_a_cluster_ends_as_a_local_one_though_a_worker_is_killed(pro
 def test_a_worker_evaluates_as_the_problem_does(problem):
     variables = np.full((2, problem.variables), 0.5)
     variables[1] = problem.encode(problem.baselines()["typical"])
-    database_hash, objectives, constraints = evaluate_here(problem.spec.model_dump_json(), variables)
+    objectives, constraints = evaluate_here(problem.spec.model_dump_json(), problem.database_hash, variables)
     here = problem.evaluate(variables)
-    assert database_hash == problem.database_hash
     assert np.array_equal(objectives, here.objectives)
     assert np.array_equal(constraints, here.constraints)
 
 
-def test_a_worker_with_another_database_is_refused(problem, cluster, monkeypatch):
-    with ClusterEvaluator(problem, cluster.scheduler_address) as evaluator:
-        monkeypatch.setattr(evaluator, "_hash", "another")
-        with pytest.raises(InputError, match="another LPV database"):
-            evaluator.evaluate(np.full((1, problem.variables), 0.5))
+def test_another_aircraft_has_another_identity(tmp_path):
+    shipped, missing = search_identity(""), search_identity(str(tmp_path / "none.nc"))
+    assert shipped == {"database": load_database().aircraft_hash}
+    assert "does not exist" in missing["database"]
 
 
-def test_nobody_at_the_address(problem, monkeypatch):
-    monkeypatch.setattr("rtsim.optimization.cluster.CONNECT_TIMEOUT_S", 1)
-    with pytest.raises(InputError, match="no Dask scheduler answers"):
-        ClusterEvaluator(problem, "tcp://127.0.0.1:1")
-
-
-@pytest.mark.parametrize("address", ["nonsense", "nonsense://x:1", "tcp://127.0.0.1", "127.0.0.1:port", ""])
-def test_what_is_no_address_is_told_at_once(problem, monkeypatch, address):
-    def no_client(*_, **__):
-        raise AssertionError
-
-    monkeypatch.setattr("distributed.Client", no_client)
-    with pytest.raises(InputError, match="is not the address of a Dask scheduler"):
-        ClusterEvaluator(problem, address)
+def test_a_database_that_changed_is_read_anew(problem, monkeypatch):
+    made = []
+    monkeypatch.setattr("rtsim.optimization.cluster.ConversionProblem", lambda spec, **_: made.append(spec) or problem)
+    variables = np.full((1, problem.variables), 0.5)
+    for aircraft_hash in ("before", "before", "after"):
+        evaluate_here(problem.spec.model_dump_json(), aircraft_hash, variables)
+    assert len(made) == 2

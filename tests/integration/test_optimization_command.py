@@ -174,7 +174,6 @@ def test_the_table_for_people(tmp_path, capsys):
 )
 def test_mistakes_are_told_in_a_sentence(arguments, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("rtsim.optimization.cluster.CONNECT_TIMEOUT_S", 1)
     code, out, err = optimize(capsys, *arguments)
     assert code == EXIT_BAD_INPUT
     assert words in " ".join(err.split())
