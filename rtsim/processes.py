@@ -18,7 +18,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
-_ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[1]
+"""The folder that holds this package and those above it."""
 _KEPT = frozenset({"PYTHONPATH", "PYTHONHOME", "PYTHONPYCACHEPREFIX", "PYTHONDONTWRITEBYTECODE", "PYTHONHASHSEED"})
 """Of Python's own variables, those that a helper is given: the others are for the user's programs."""
 
@@ -61,7 +62,7 @@ def safe_environment() -> dict[str, str]:
     """An environment that finds this very package, also in a source tree, and nothing in the current folder."""
     environment = {name: value for name, value in os.environ.items() if name in _KEPT or not name.startswith("PYTHON")}
     given = [entry for entry in environment.get("PYTHONPATH", "").split(os.pathsep) if entry]
-    paths = [str(_ROOT), *(str(Path(entry).absolute()) for entry in given if not is_here(entry))]
+    paths = [str(ROOT), *(str(Path(entry).absolute()) for entry in given if not is_here(entry))]
     environment["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(paths))
     # A helper beside a 250 Hz loop must not spread numpy's or Arrow's thread pools over its cores.
     threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_NUM_THREADS": "1"}

@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from rtsim.errors import OutputError
-from rtsim.processes import end_process, ending, is_here, start_process
+from rtsim.processes import ROOT, end_process, ending, is_here, start_process
 
 AHEAD = 4
 """Pieces per worker that may be done before the first of them is taken."""
@@ -77,7 +77,7 @@ class _Worker:
         self.piece: int | None = None
         # What this process can import, a worker can; but nothing stands before what is installed.
         here = [entry for entry in sys.path if is_here(entry)]
-        self.connection.send([entry for entry in sys.path if entry not in here] + here)
+        self.connection.send([str(ROOT), *(entry for entry in sys.path if entry not in here), *here])
 
 
 class _Pool:
