@@ -210,7 +210,7 @@ def test_import_refuses_what_is_wrong_by_name(capsys, tmp_path):
 
 def test_unwritable_target_is_exit_four(capsys, tmp_path):
     assert run(["model", "export", str(tmp_path / "absent" / "copy.nc")]) == 4
-    assert "cannot be written: No such file" in capsys.readouterr().err
+    assert "cannot be written: there is no folder" in capsys.readouterr().err
 
 
 @pytest.mark.slow
