@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
+import weakref
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import IO, TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from scenarios.flight.limit_watch import LimitWatch
 
 _CHUNK = 4096
+MEMORY_ROWS = 65_536
+"""Rows of a history that are kept in memory besides those that came last, 32 MB: 4 minutes at 250 Hz."""
 _VIEW_PIECE = 64
 _VIEW_BACKLOG = 1024
 _DROPPED = [signal.name for signal in TIMING_SIGNALS].index("telemetry_dropped")
@@ -98,13 +102,15 @@ class RowMirror(Protocol):
 
 
 class History:
-    """All rows of a flight, kept in chunks."""
+    """All rows of a flight: the newest ``MEMORY_ROWS`` in memory, older ones in a file without a name."""
 
     def __init__(self) -> None:
         self.chunks: list[FloatArray] = []
-        """Full chunks."""
+        """What is in memory, but for the rows that came last."""
         self._current = np.empty((_CHUNK, SIGNAL_COUNT))
         self._fill = 0
+        self._file: IO[bytes] | None = None
+        self._filed = 0
 
     def append(self, row: FloatArray) -> None:
         """Keep one row.
@@ -115,7 +121,7 @@ class History:
         self._current[self._fill] = row
         self._fill += 1
         if self._fill == _CHUNK:
-            self.chunks.append(self._current)
+            self._keep(self._current)
             self._current, self._fill = np.empty((_CHUNK, SIGNAL_COUNT)), 0
 
     def extend(self, rows: FloatArray) -> None:
@@ -125,7 +131,7 @@ class History:
             rows: The frames, shape (frames, SIGNAL_COUNT); the array itself is kept.
         """
         if self._fill:
-            self.chunks.append(self._current[: self._fill])
+            self._keep(self._current[: self._fill])
             self._current, self._fill = np.empty((_CHUNK, SIGNAL_COUNT)), 0
         if not len(rows):
             return
@@ -136,17 +142,47 @@ class History:
             first = (last.ctypes.data - whole.ctypes.data) // whole.strides[0]
             self.chunks[-1] = whole[first : first + len(last) + len(rows)]
         else:
-            self.chunks.append(rows)
+            self._keep(rows)
 
     def rows(self) -> FloatArray:
         """All rows, shape (frames, SIGNAL_COUNT), read-only."""
         self.extend(np.empty((0, SIGNAL_COUNT)))
+        if self._file is not None:
+            while self.chunks and self._file_oldest():
+                pass
+            self._file.flush()
+            filed = np.memmap(self._file, dtype=np.float64, mode="r", shape=(self._filed, SIGNAL_COUNT))
+            self.chunks.insert(0, filed)
         if len(self.chunks) == 1:
-            whole = self.chunks[0].view()
+            whole = np.asarray(self.chunks[0]).view()
         else:
             whole = np.concatenate(self.chunks) if self.chunks else np.empty((0, SIGNAL_COUNT))
+        if self._file is not None:
+            del self.chunks[0]
         whole.flags.writeable = False
         return whole
+
+    def _keep(self, chunk: FloatArray) -> None:
+        """Keep a chunk; where there are too many, file the oldest, only one: a live flight has little time."""
+        self.chunks.append(chunk)
+        if sum(map(len, self.chunks[:-1])) > MEMORY_ROWS:
+            self._file_oldest()
+
+    def _file_oldest(self) -> bool:
+        """Move the oldest chunk to the file; False where that cannot be: it stays in memory."""
+        chunk = np.ascontiguousarray(self.chunks[0])
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(prefix="rtsim-")  # noqa: SIM115
+                weakref.finalize(self, self._file.close)
+            self._file.seek(self._filed * chunk.strides[0])
+            self._file.write(chunk.data)
+            self._file.flush()
+        except OSError:  # the disk is full
+            return False
+        self._filed += len(chunk)
+        del self.chunks[0]
+        return True
 
 
 class FlightSinks:
