@@ -10,6 +10,25 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from rtsim.errors import InputError
+
+FORMATS = (".png", ".svg", ".pdf")
+"""Endings of pictures."""
+
+
+def check_picture(path: Path, key: str) -> None:
+    """Refuse a picture of no kind that can be drawn, before there is anything to draw.
+
+    Args:
+        path: The picture.
+        key: The option that names it.
+
+    Raises:
+        InputError: Its ending says no format.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise InputError("unknown picture format", key=key, value=str(path), allowed=", ".join(FORMATS))
+
 
 @contextlib.contextmanager
 def drawing(**settings: Any) -> Iterator[None]:

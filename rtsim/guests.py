@@ -12,9 +12,14 @@ import os
 import re
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
+
+from rtsim.errors import Terminated
+
+Answer = TypeVar("Answer")
 
 LONGEST_WORDS = 300
 """Characters of a guest's text that people are shown."""
@@ -50,6 +55,29 @@ class Visit:
             with suppress(OSError):
                 if os.getcwd() != self._folder:  # noqa: PTH109
                     os.chdir(self._folder)
+
+
+class GuestError(Exception):
+    """A guest raised something; the words say what, readably."""
+
+
+def visited(function: Callable[..., Answer], *given: Any) -> Answer:
+    """Call a guest.
+
+    Args:
+        function: What is called.
+        given: Its arguments.
+
+    Raises:
+        GuestError: It raised anything whatever, but for what ends rtsim itself.
+    """
+    try:
+        with Visit():
+            return function(*given)
+    except (KeyboardInterrupt, Terminated):
+        raise  # from whoever runs rtsim
+    except BaseException as error:
+        raise GuestError(words_of(error)) from error
 
 
 def words_of(error: BaseException) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.output import console, emit_json, results
-from rtsim.drawing import drawing
+from rtsim.drawing import check_picture, drawing
 from rtsim.errors import InputError
 from rtsim.whole_file import check_writable, whole_file
 
@@ -44,6 +44,7 @@ def corridor_command(
 ) -> None:
     """Show the boundaries and centre line of the conversion corridor; with a point, its margins."""
     if plot is not None:
+        check_picture(plot, "--plot")
         check_writable(plot)
     from rtsim.corridor.boundaries import load_corridor
     from rtsim.units import deg, kt
@@ -202,9 +203,6 @@ def _print_table(corridor: Corridor) -> None:
 @drawing()
 def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> None:
     """Draw the corridor, airspeed across and nacelle angle up, helicopter mode on top as in the paper."""
-    formats = (".png", ".svg", ".pdf")
-    if path.suffix.lower() not in formats:
-        raise InputError("unknown picture format", key="--plot", value=str(path), allowed=", ".join(formats))
     import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import importlib.util
 import os
 import sys
+import threading
 from collections.abc import Sequence
-from contextlib import nullcontext
-from typing import Annotated
+from contextlib import nullcontext, suppress
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -150,7 +152,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         code = _invoke(arguments)
-        sys.stdout.flush()
+        with suppress(ValueError):  # a user's own code closed it
+            sys.stdout.flush()
     except RtsimError as error:
         _fail(str(error))
         return error.exit_code
@@ -215,7 +218,19 @@ def main() -> None:
     _open_closed_streams()
     leave_settings_of_others()
     stopping.catch_signals()
-    sys.exit(run())
+    _leave(run())
+
+
+def _leave(code: int) -> NoReturn:
+    """End the process, whatever threads a user's own code has left running."""
+    here = threading.current_thread()
+    if not any(thread is not here and not thread.daemon for thread in threading.enumerate()):
+        sys.exit(code)
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":

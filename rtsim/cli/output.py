@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 from rtsim.jsonable import to_jsonable
@@ -75,7 +75,8 @@ def machine_output() -> Iterator[None]:
     try:
         yield
     finally:
-        stdout.flush()
+        with suppress(OSError, ValueError):  # a user's own code closed it
+            stdout.flush()
         os.dup2(kept, 1)
         _answers.pop().close()
 

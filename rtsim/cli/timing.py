@@ -9,7 +9,7 @@ import typer
 
 from rtsim.cli.flight_text import say
 from rtsim.cli.output import emit_json, results
-from rtsim.drawing import drawing
+from rtsim.drawing import check_picture, drawing
 from rtsim.errors import InputError
 from rtsim.whole_file import check_writable, whole_file
 
@@ -38,6 +38,7 @@ def timing_command(
 ) -> None:
     """Fly the hover in real time and report lateness, work, overruns and drift."""
     if plot is not None:
+        check_picture(plot, "--plot")
         check_writable(plot)
     from rtsim.loop.options import declared
 

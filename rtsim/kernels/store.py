@@ -43,6 +43,10 @@ def read(name: str) -> memoryview | None:
             continue
         path = folder / name
         try:
+            if not path.is_file():
+                if os.path.lexists(path):  # a pipe, a folder, a link to nowhere: nothing that we wrote
+                    damaged(name)
+                continue
             content = memoryview(path.read_bytes())
         except FileNotFoundError:
             continue
@@ -60,7 +64,7 @@ def read(name: str) -> memoryview | None:
 def damaged(name: str) -> None:
     """Throw a piece away that nothing can be made of."""
     for folder in (main_folder(), _private()):
-        if folder is not None and (folder / name).exists():
+        if folder is not None and os.path.lexists(folder / name):
             _tell(f"{folder / name}: is damaged; it is made anew.")
             with contextlib.suppress(OSError):
                 (folder / name).unlink()

@@ -233,7 +233,7 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         file=file,
         automatic=automatic_settings(content.automatic),
         pulses=pulses_of(content.pulses),
-        trial=trial_of(content.trial),
+        trial=trial_of(content.trial, given(content.flight).get("protection")),
     )
 
 

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from rtsim.command import Command, NacelleLaw, Sensors
 from rtsim.errors import InputError
-from rtsim.guests import Visit, words_of
+from rtsim.guests import GuestError, visited
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.programme import Programme
 from rtsim.strict import Strict
@@ -184,10 +184,9 @@ class NacelleLawGuard:
         if self._law is None:
             return command, ""
         try:
-            with Visit():
-                rate = float(self._law.step(sensors, command, dt))
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything; the flight must go on
-            failure = f"the nacelle law raised {words_of(error)}"
+            rate = visited(lambda law: float(law.step(sensors, command, dt)), self._law)
+        except GuestError as error:
+            failure = f"the nacelle law raised {error}"
         else:
             if math.isfinite(rate):
                 return dataclasses.replace(command, nacelle_rate=rate), ""

@@ -106,17 +106,18 @@ def _test_problems(trial: TrialTable, *, has_events: bool, flight: Mapping[str, 
     return found
 
 
-def trial_of(table: TrialTable | None) -> Trial | None:
+def trial_of(table: TrialTable | None, protection: str | None = None) -> Trial | None:
     """Bring a checked ``[trial]`` to its form in the program.
 
     Args:
         table: From a scenario file, without contradictions.
+        protection: What ``[flight]`` says of it; the law under test where ``[trial]`` names none.
     """
     if table is None:
         return None
     return Trial(
         kind=table.kind,
-        law=table.law,
+        law=table.law or protection or "full",
         off_leaves=tuple(table.off_leaves),
         off_depth_kt=table.off_depth_kt,
         no_harm_height=table.no_harm_height_m,

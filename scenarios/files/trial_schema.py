@@ -37,7 +37,7 @@ class TrialTable(Strict):
     """``[trial]``: the scenario is a test of envelope protection, flown with a law and, with the same seed, without."""
 
     kind: Literal["nominal", "misuse", "failure", "unprotectable"]
-    law: Annotated[str, Field(max_length=200)] = "full"
+    law: Annotated[str | None, Field(max_length=200)] = None
     off_leaves: list[Literal["corridor", "flapping", "torque", "load_factor", "pitch", "control", "height"]] = []
     off_depth_kt: Annotated[float, Field(ge=0.0, le=300.0)] = 0.0
     no_harm_height_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 30.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from rtsim.arguments import instance
 from rtsim.arrays import FloatArray
-from rtsim.errors import OutputError
+from rtsim.errors import InputError, OutputError
 from rtsim.frame import history_sha256
 from rtsim.jsonable import to_jsonable
 from rtsim.loop import beside
@@ -175,7 +176,10 @@ def _refuse_outputs(outputs: FlightOutputs) -> None:
     if outputs.log is not None:
         check_log(outputs.log, overwrite=outputs.overwrite)
     if outputs.view is not None and outputs.view.record is not None:
-        check_recording(outputs.view.record)
+        record, log = Path(os.path.realpath(outputs.view.record)), outputs.log
+        if log is not None and record.is_relative_to(Path(os.path.realpath(log))):
+            raise InputError("lies in the log", key="--record", value=str(outputs.view.record), mend="put it beside it")
+        check_recording(record)
 
 
 def _chosen(scenario: str | Path | Scenario, overrides: Overrides | None) -> Scenario:
@@ -195,8 +199,11 @@ def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
         return None
     from telemetry.view.view import RerunView
 
+    options = outputs.view
+    if options.record is not None:  # a link stays, and what it names is written
+        options = dataclasses.replace(options, record=Path(os.path.realpath(options.record)))
     return RerunView(
-        outputs.view,
+        options,
         corridor=corridor_outline(scenario.options.corridor_name, scenario.options.database),
         title=scenario.name,
         rate_hz=scenario.options.rate_hz,

@@ -15,7 +15,7 @@ from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults.fault import fault_events
 from rtsim.frame import SIGNAL_COUNT
-from rtsim.guests import Visit, words_of
+from rtsim.guests import GuestError, visited
 from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.protection.chain import LawEvent
@@ -328,11 +328,10 @@ class FlightSession:
         """The plug-in's command; where it fails, the flight ends with the controls held for one last frame."""
         simulation = self.simulation
         try:
-            with Visit():
-                answer = pilot.step(simulation.sensors(), simulation.reference(), simulation.dt)
-            command = Command(float(answer.stick), float(answer.lever), float(answer.nacelle_rate))
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - a user's own code may raise anything; end cleanly
-            problem = f"raised {words_of(error)}"
+            answer = visited(pilot.step, simulation.sensors(), simulation.reference(), simulation.dt)
+            command = visited(_as_command, answer)
+        except GuestError as error:
+            problem = f"raised {error}"
         else:
             if math.isfinite(command.stick + command.lever + command.nacelle_rate):
                 return command
@@ -356,3 +355,7 @@ class FlightSession:
             time = self.simulation.frame_index * self.dt
             details = {"row": self.rows, **(data or {})}
             self.on_event(LogEvent(self.simulation.frame_index, time, kind, text, level, details))
+
+
+def _as_command(answer: Any) -> Command:
+    return Command(float(answer.stick), float(answer.lever), float(answer.nacelle_rate))

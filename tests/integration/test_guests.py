@@ -65,6 +65,27 @@ class Sleeps(Good):
             time.sleep(0.05)
         return command, []
 
+class Odd(BaseException):
+    def __str__(self):
+        raise ValueError
+
+class Hard:
+    def step(self, *given):
+        raise Odd
+
+class Exits:
+    def step(self, *given):
+        raise GeneratorExit("boom" + 5000 * "x")
+
+class Stays:
+    def step(self, sensors, reference, dt):
+        if sensors.time == 0.0:
+            import threading
+            threading.Thread(target=time.sleep, args=(600,)).start()
+            sys.stdout.close()
+        import rtsim.command
+        return rtsim.command.Command(0.0, 0.73, 0.0)
+
 class Flies:
     def step(self, sensors, reference, dt):
         os.chdir("/"); print("flying")
@@ -112,6 +133,39 @@ def test_a_pilot_is_a_guest_too(folder, capsys):
     assert "raised RuntimeError" in told
     assert "\x1b[2J" not in told
     assert Path.cwd() == folder
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "code", "words"),
+    [
+        ("--pilot", "Hard", 1, "raised Odd"),
+        ("--pilot", "Exits", 1, "raised GeneratorExit"),
+        ("--nacelle", "Hard", 0, "raised Odd"),
+        ("--nacelle", "Exits", 0, "raised GeneratorExit"),
+    ],
+)
+def test_whatever_a_pilot_or_nacelle_law_raises_is_told(option, name, code, words, capsys):
+    fly = ["fly", "hover", "--headless", "--speed", "max", "--duration", "1", option, f"guestlaws:{name}", "--json"]
+    assert run(fly) == code
+    told = capsys.readouterr()
+    assert words in told.err
+    assert len(told.err) < 5000
+    assert json.loads(told.out)["frames"] > 0
+
+
+def test_threads_and_closed_streams_of_a_guest_keep_nobody(folder):
+    ended = command(
+        "fly", "hover", "--headless", "--speed", "max", "--duration", "1", "--pilot", "guestlaws:Stays", "--json"
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout)["frames"] == 250
+    assert folder
+
+
+def test_a_trial_is_flown_with_the_law_that_the_flight_names(folder):
+    text = TRIAL.replace("[start]", '[flight]\nprotection = "governor"\n[start]')
+    (folder / "mine.toml").write_text(text, encoding="utf-8")
+    assert tester.Tester().run(the_scenario()).law == "governor"
 
 
 @pytest.mark.parametrize("law", ["Works", "Sleeps"])

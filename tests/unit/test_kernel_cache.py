@@ -133,6 +133,23 @@ def test_a_damaged_cache_is_told_once_and_healed(filled, tmp_path, damage):
     assert not second.stderr
 
 
+@pytest.mark.parametrize("odd", ["pipe", "folder", "endless", "circle"])
+def test_what_is_no_file_is_no_piece(filled, tmp_path, odd):
+    """A pipe in the cache made every command wait for ever."""
+    shutil.copytree(filled[0], tmp_path, dirs_exist_ok=True)
+    for path in (tmp_path / "rtsim" / "kernels" / kernel_cache.source_hash(ROOT)).iterdir():
+        path.unlink()
+        {
+            "pipe": os.mkfifo,
+            "folder": lambda place: place.mkdir(),
+            "endless": lambda place: place.symlink_to("/dev/zero"),
+            "circle": lambda place: place.symlink_to(place),
+        }[odd](path)
+    done = compiled(tmp_path)
+    assert done.stdout == filled[1].stdout
+    assert done.stderr.count("\n") == 1
+
+
 @pytest.mark.parametrize(("limit", "cache"), [(None, "/dev/null"), (None, "/proc/nowhere"), (64, None), (64, "filled")])
 def test_where_nothing_can_be_kept_that_is_told_and_the_work_goes_on(filled, tmp_path, limit, cache):
     """faults.md C2, C3: no folder, one that takes nothing (a file may have 64 bytes, as on a full disk)."""

@@ -120,6 +120,24 @@ def test_what_cannot_be_written_is_refused_before_work(command, tmp_path, monkey
     assert os.listdir(tmp_path) == ["file"]  # noqa: PTH208 - hidden ones too
 
 
+def test_a_recording_goes_through_a_link_and_not_into_a_log(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    fly = ["fly", "hover", "--headless", "--speed", "max", "--duration", "1"]
+    Path("link.rrd").symlink_to("there.rrd")
+    assert run([*fly, "--record", "link.rrd"]) == 0
+    assert Path("link.rrd").is_symlink()
+    assert Path("there.rrd").stat().st_size > 1000
+    assert run([*fly, "--record", "a.parquet/x.rrd", "--log", "a.parquet"]) == 2
+    assert "lies in the log" in capsys.readouterr().err
+    assert not Path("a.parquet").exists()
+
+
+def test_a_picture_of_no_kind_is_refused_before_work(capsys):
+    for command in ("corridor", "timing"):
+        assert run([command, "--plot", "/dev/full"]) == 2
+        assert "unknown picture format" in capsys.readouterr().err
+
+
 def test_a_bundle_replaces_a_bundle_and_nothing_else(tmp_path, monkeypatch):
     """E3's kind: a folder that was taken for ours lost what was not."""
     monkeypatch.chdir(tmp_path)

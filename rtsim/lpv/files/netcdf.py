@@ -122,7 +122,7 @@ def write_database(database: Database, path: str | Path) -> None:
             with netCDF4.Dataset(str(part), "w", format="NETCDF4") as dataset:
                 _write(dataset, database)
         except RuntimeError as error:  # how the library tells of a full disk
-            raise OSError(str(error)) from error
+            raise OSError(f"{error} (is the disk full?)") from error
 
 
 def _write(dataset: Any, database: Database) -> None:
