@@ -52,7 +52,7 @@ class StickInput(NamedTuple):
     stream: int = 0
     """When these inputs began, or began anew [ns]; another value means another hand, or one that was away."""
     overridden: int = 0
-    """What a second source of the same hand has taken from the first: 1 the stick, 2 the lever."""
+    """What a second source of the same hand has taken from the first: 1 the stick, 2 the lever, 4 the nacelle angle."""
 
 
 @dataclass(frozen=True, slots=True)

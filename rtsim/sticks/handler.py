@@ -180,7 +180,8 @@ class StickHandler:
         self._lever = _Control(start.lever, LEVER_FADE_RATE)
         self._stream = 0
         self._target = math.nan
-        self._axis_angle = math.nan
+        self._stick_owner: int | None = None
+        self._axis_angles: dict[tuple[int, int], float] = {}
         self.change(settings)
         # The kernels load now, not in a frame.
         self._limit(0.0)
@@ -277,8 +278,10 @@ class StickHandler:
             self.trim = min(max(moved, -LARGEST_TRIM), LARGEST_TRIM)
 
         place = shaped(settings, sticks.stick)
-        # A stick that nobody had, and that appears among inputs that go on, comes from its centre.
-        before = 0.0 if goes_on and not self._stick.held else place
+        # A stick that its owner never had, and that appears among inputs that go on, comes from its centre.
+        before = 0.0 if goes_on and not self._stick.held and self._stick_owner != sticks.owner else place
+        if stick_held:
+            self._stick_owner = sticks.owner
         hand = _Hand(place, (stream, sticks.overridden & 1), before) if stick_held else None
         stick = self._stick.step(hand, dt, settings=settings, rest=situation.trim_stick, trim=self.trim)
         place = min(max(sticks.lever, 0.0), 1.0)
@@ -307,7 +310,7 @@ class StickHandler:
         pressed = sticks.nacelle_switch if fresh else 0
         self.nacelle_switch = pressed
         if fresh:
-            self._follow_axis(sticks.nacelle_angle, goes_on=goes_on)
+            self._follow_axis(sticks.nacelle_angle, (sticks.owner, sticks.overridden & 4), goes_on=goes_on)
         if pressed:
             self._target, self.transition = math.nan, 0
         angle = situation.nacelle_command
@@ -326,12 +329,17 @@ class StickHandler:
             return self._transition_rate(self._schedule, situation, dt)
         return 0.0
 
-    def _follow_axis(self, angle: float, *, goes_on: bool) -> None:
-        """An axis commands when it moves, or appears among inputs that go on; at rest it leaves the switch alone."""
-        if not goes_on or not math.isfinite(angle):
-            self._axis_angle = angle
-        elif not abs(angle - self._axis_angle) <= _NEW_ANGLE:
-            self._axis_angle = angle
+    def _follow_axis(self, angle: float, source: tuple[int, int], *, goes_on: bool) -> None:
+        """An axis commands when it moves, or appears among inputs that go on; at rest it leaves the switch alone.
+
+        An axis that comes back where it was, by the same owner and message, has not moved.
+        """
+        if not math.isfinite(angle):
+            return
+        if not goes_on:
+            self._axis_angles[source] = angle
+        elif not abs(angle - self._axis_angles.get(source, math.nan)) <= _NEW_ANGLE:
+            self._axis_angles[source] = angle
             self.go_to(angle)
 
     def _transition_rate(self, schedule: TransitionSchedule, situation: StickSituation, dt: float) -> float:

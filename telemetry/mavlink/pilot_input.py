@@ -43,7 +43,7 @@ EDGE_BUTTONS = (
 )
 """Functions that act once when their button goes down; the others act while it is held."""
 _RELEASE, _IGNORE = 0, 65535
-_CHANNEL_BITS = {"stick": 1, "lever": 2}
+_CHANNEL_BITS = {"stick": 1, "lever": 2, "nacelle": 4}
 _Said = dict[str, tuple[float, int]]
 """What one message said, and when, by control."""
 
@@ -188,16 +188,13 @@ class StickReader:
         """
         buttons = (message.buttons & 0xFFFF) | (message.buttons2 & 0xFFFF) << 16
         held = {function: buttons >> number & 1 for function, number in self._buttons.items()}
-        given = {control: self._manual_axis(message, control) for control in ("stick", "lateral", "yaw")}
+        given = {control: self._manual_axis(message, control) for control in ("stick", "lateral", "yaw", "nacelle")}
         given["lever"] = self._manual_lever(message, bipolar=bipolar)
-        for control, value in given.items():  # an axis without a good value keeps its last one
-            kept = _live(self._manual, control, received_ns, lasts_ns) if value is None else value
-            if kept is not None:
-                self._manual[control] = kept, received_ns
-        nacelle = self._manual_axis(message, "nacelle")
-        self._manual.pop("nacelle", None)
-        if nacelle is not None:
-            self._manual["nacelle"] = nacelle, received_ns
+        for control, value in given.items():
+            if value is not None:  # an axis without a good value keeps its last one, for as long as that counts
+                self._manual[control] = value, received_ns
+        if not self._carried(message, "nacelle"):
+            self._manual.pop("nacelle", None)
         self._manual["switch"] = held["nacelle_aft"] - held["nacelle_forward"], received_ns
         self._manual["trim"] = held["trim_forward"] - held["trim_aft"], received_ns
         self._manual["buttons"] = buttons, received_ns
@@ -264,14 +261,16 @@ class StickReader:
             overridden=overridden,
         )
 
+    def _carried(self, message: Any, control: str) -> bool:
+        """Whether a message has the axis of a control, with a good value or a bad one."""
+        place, _ = self._axes.get(control, (-1, 1.0))
+        return 0 <= place < 4 or (place >= 4 and bool(message.enabled_extensions >> (place - 4) & 1))
+
     def _manual_axis(self, message: Any, control: str) -> float | None:
         """Value of a control between -1 and 1, or None where the message has no good one."""
-        source = self._axes.get(control)
-        if source is None:
+        if not self._carried(message, control):
             return None
-        place, sign = source
-        if place >= 4 and not message.enabled_extensions >> (place - 4) & 1:
-            return None
+        place, sign = self._axes[control]
         raw = int(getattr(message, FIELD_ORDER[place]))
         if not -1000 <= raw <= 1000:
             self.ignored_axes += 1

@@ -275,8 +275,6 @@ class Vehicle(Outbox):
         heartbeat = self.factory.build(ids.HEARTBEAT)[0]
         heartbeat.system_status = dialect.MAV_STATE_POWEROFF
         self.broadcast(heartbeat)
-        if self._signatures is not None:
-            self._signatures.close()
 
     def _stream(self, now: float) -> None:
         """Send every stream that is due; each message is made once for all stations."""

@@ -181,19 +181,43 @@ def test_signatures_are_checked():
 
 
 def test_signed_frames_are_not_accepted_again_after_a_restart(tmp_path):
-    """Whether the vehicle was closed or killed; and the station goes on within a second."""
+    """However the vehicle ended; and the station goes on within a second."""
     kept = tmp_path / "key.seen"
     first = SignatureCheck(KEY, kept)
     now = signature_time()
     seen = [one(packed(BEAT, key=KEY, stamp=now + number)) for number in range(5)]
     assert all(first.accepts(frame) for frame in seen)
-    killed = SignatureCheck(KEY, kept)
-    assert not any(killed.accepts(frame) for frame in seen)
-    assert killed.accepts(one(packed(BEAT, key=KEY, stamp=now + 100_001)))
-    killed.close()
-    closed = SignatureCheck(KEY, kept)
-    assert not any(closed.accepts(frame) for frame in seen)
-    assert closed.accepts(one(packed(BEAT, key=KEY, stamp=now + 100_002)))
+    for number in (1, 2):
+        again = SignatureCheck(KEY, kept)
+        assert not any(again.accepts(frame) for frame in seen)
+        seen.append(one(packed(BEAT, key=KEY, stamp=now + number * 100_001)))
+        assert again.accepts(seen[-1])
+
+
+def test_flights_side_by_side_never_lower_a_stamp(tmp_path):
+    """Whichever started first, wrote last or heard another station, a third flight refuses what either heard."""
+    kept = tmp_path / "key.seen"
+    now = signature_time()
+    first = SignatureCheck(KEY, kept)
+    assert first.accepts(one(packed(BEAT, key=KEY, stamp=now - 30 * 100_000)))
+    second = SignatureCheck(KEY, kept)
+    heard = [one(packed(BEAT, key=KEY, stamp=now)), one(packed(BEAT, key=KEY, link=2, stamp=now))]
+    assert first.accepts(heard[0])
+    assert second.accepts(heard[1])
+    assert second.accepts(one(packed(BEAT, key=KEY, stamp=now - 20 * 100_000)))  # its own stamp is older
+    assert first.accepts(one(packed(BEAT, key=KEY, link=3, stamp=now)))
+    third = SignatureCheck(KEY, kept)
+    assert not any(third.accepts(frame) for frame in heard)
+    assert not third.trouble
+
+
+def test_a_known_stream_has_no_older_frames_either(monkeypatch):
+    check = SignatureCheck(KEY)
+    now = signature_time()
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=now)))
+    monkeypatch.setattr("telemetry.mavlink.signatures.signature_time", lambda: now + 90 * 100_000)
+    assert not check.accepts(one(packed(BEAT, key=KEY, stamp=now + 29 * 100_000)))
+    assert check.accepts(one(packed(BEAT, key=KEY, stamp=now + 31 * 100_000)))
 
 
 @pytest.mark.parametrize("damage", ["unreadable", "folder", "unwritable"])

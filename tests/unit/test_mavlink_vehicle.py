@@ -610,6 +610,34 @@ def test_bad_axes_keep_the_last_good_value(bench):
     assert bench.vehicle.reader.ignored_axes == 4
 
 
+@pytest.mark.parametrize("bad", [32767, 1001, -32768])
+def test_an_extension_axis_keeps_its_last_good_value(bench, bad):
+    bench.send(manual(enabled_extensions=4, aux1=1000))
+    bench.send(manual(enabled_extensions=4, aux1=bad))
+    assert math.degrees(bench.exchange.read_sticks().nacelle_angle) == pytest.approx(90.0)
+    assert bench.vehicle.reader.ignored_axes == 1
+
+
+def test_an_axis_without_a_good_value_is_lost_alone(bench):
+    bench.send(manual(x=300, z=700, enabled_extensions=4, aux1=1000))
+    for _ in range(40):
+        bench.fly(0.02)
+        bench.send(manual(x=32767, z=700, enabled_extensions=4, aux1=32767))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.stick_valid, sticks.lever_valid, sticks.lever) == (False, True, 0.7)
+    assert math.isnan(sticks.nacelle_angle)
+
+
+def test_an_overridden_nacelle_axis_is_another_source(bench):
+    bench.send(manual(enabled_extensions=4, aux1=1000))
+    bench.send(override(65535, 65535, 65535, 65535, 65535, 1500))
+    sticks = bench.exchange.read_sticks()
+    assert (math.degrees(sticks.nacelle_angle), sticks.overridden) == (pytest.approx(45.0), 4)
+    bench.send(override(65535, 65535, 65535, 65535, 65535, 0))
+    sticks = bench.exchange.read_sticks()
+    assert (math.degrees(sticks.nacelle_angle), sticks.overridden) == (pytest.approx(90.0), 0)
+
+
 def test_an_axis_never_given_is_nobodys(bench):
     bench.send(manual(x=32767, z=500))
     sticks = bench.exchange.read_sticks()

@@ -133,6 +133,24 @@ def test_a_stick_that_appears_among_inputs_that_go_on_acts():
     assert fly(hands, LIVE._replace(stick=0.3), frames=100)[0][-1].stick == 0.3
 
 
+@pytest.mark.parametrize("whole_loss_too", [False, True])
+def test_a_stick_lost_alone_comes_back_softly(whole_loss_too):
+    """It stays at its trim until the hand passes that place, also where a lever came back before it."""
+    hands = handler()
+    fly(hands, LIVE, frames=5)
+    fly(hands, LIVE._replace(stick=0.2), frames=50)
+    if whole_loss_too:
+        fly(hands, LIVE, frames=50, age=1.0)
+    stream = 2 if whole_loss_too else 1
+    fly(hands, LIVE._replace(stick_valid=False, stream=stream), frames=200)
+    back = LIVE._replace(stick=0.4, stream=stream)
+    assert {command.stick for command in fly(hands, back, frames=150)[0]} == {0.0}
+    assert hands.waiting & 1
+    commands, _ = fly(hands, back._replace(stick=-0.1), frames=100)
+    assert np.max(np.abs(np.diff([command.stick for command in commands]))) <= 0.0201
+    assert commands[-1].stick == -0.1
+
+
 def test_lost_input_centres_the_stick_and_holds_lever_and_nacelle():
     hands = handler()
     fly(hands, LIVE, frames=1)
@@ -236,6 +254,35 @@ def test_an_axis_commands_when_it_moves_and_not_while_it_rests():
     assert after[-1] == angles[-1] < deg(80.0)
     _, angles = fly(hands, axis._replace(nacelle_angle=deg(82.0)), frames=1000, command_angle=after[-1])
     assert to_deg(angles[-1]) == pytest.approx(82.0, abs=1e-9)
+
+
+AWAY = LIVE._replace(nacelle_angle=math.nan)
+
+
+@pytest.mark.parametrize(
+    ("axis", "gap"),
+    [
+        ({}, AWAY),  # lost alone
+        ({"overridden": 4}, AWAY),
+        ({"overridden": 4}, LIVE._replace(nacelle_angle=deg(40.0))),  # an axis at rest beneath an override
+        ({"overridden": 4}, AWAY._replace(stream=2)),  # another message came first after a whole loss
+    ],
+)
+def test_an_axis_that_comes_back_where_it_was_has_not_moved(axis, gap):
+    hands = handler()
+    fly(hands, gap._replace(stream=1), frames=5)
+    rest = LIVE._replace(nacelle_angle=deg(80.0), **axis)
+    _, angles = fly(hands, rest, frames=1000)
+    assert to_deg(angles[-1]) == pytest.approx(80.0)
+    _, angles = fly(hands, rest._replace(nacelle_switch=1), frames=100, command_angle=angles[-1])
+    assert set(fly(hands, gap, frames=50, command_angle=angles[-1])[1]) == {angles[-1]}
+    back = rest._replace(stream=gap.stream)
+    assert set(fly(hands, back, frames=50, command_angle=angles[-1])[1]) == {angles[-1]}
+    _, angles = fly(hands, back._replace(nacelle_angle=deg(81.0)), frames=1000, command_angle=angles[-1])
+    assert to_deg(angles[-1]) == pytest.approx(81.0)
+    other = rest._replace(owner=7, stream=3)  # it has not had the axis before
+    fly(hands, other._replace(nacelle_angle=math.nan), frames=5, command_angle=angles[-1])
+    assert fly(hands, other, frames=5, command_angle=angles[-1])[1][-1] < angles[-1]
 
 
 def test_trim_buttons_move_the_centre():
