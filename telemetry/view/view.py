@@ -15,12 +15,11 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from rtsim.processes import end_process, ending, start_process
+from rtsim.processes import end_process, ending, processor_ticks, start_process
 from telemetry.exchange.ring import Ring
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions
@@ -175,7 +174,7 @@ class RerunView:
                 self._read_answers()
                 if (newest := self._signs_of_progress()) != signs:
                     signs, moved, wrote = newest, now, now
-                elif (used := _processor_ticks(process.pid)) != ticks and now < wrote + _LONGEST_THOUGHT_S:
+                elif (used := processor_ticks(process.pid)) != ticks and now < wrote + _LONGEST_THOUGHT_S:
                     ticks, moved = used, now
                 time.sleep(0.005)
             self._read_answers()
@@ -294,12 +293,3 @@ class RerunView:
         self.messages.append(message)
         if self._on_message is not None:
             self._on_message(message)
-
-
-def _processor_ticks(number: int) -> int:
-    """Processor time a process has used [ticks]; 0 where the system does not tell."""
-    try:
-        words = Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-        return int(words[11]) + int(words[12])
-    except (OSError, ValueError, IndexError):
-        return 0
