@@ -3,7 +3,8 @@
 A helper imports nothing from the current folder, whatever lies there; it has a session of its own, since Ctrl-C is for
 the command, which then ends it in order; and it has few threads. It ends when the process that started it does, however
 that one ended: most read the end of their stdin, the others call ``end_with_parent``. Nothing that it shares has a name
-(memory, sockets, locked files are handed down), so nothing is left behind where all are killed at once.
+(memory, sockets, locked files are handed down), so nothing is left behind where all are killed at once. One that hangs
+is told from one that works by its processor time (``Stillness``) and treated as one that died.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import signal
 import subprocess
 import sys
 import threading
+import time
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
@@ -22,6 +25,10 @@ ROOT = Path(__file__).resolve().parents[1]
 """The folder that holds this package and those above it."""
 _KEPT = frozenset({"PYTHONPATH", "PYTHONHOME", "PYTHONPYCACHEPREFIX", "PYTHONDONTWRITEBYTECODE", "PYTHONHASHSEED"})
 """Of Python's own variables, those that a helper is given: the others are for the user's programs."""
+_LONGEST_LOOK_S = 1.0
+"""What one look at a helper adds to its stillness at most [s]: this process may have been stopped together with it."""
+_hung: weakref.WeakKeyDictionary[subprocess.Popen[Any], float] = weakref.WeakKeyDictionary()
+"""Helpers that were ended since they did nothing, and for how long they had [s]."""
 
 
 def start_process(
@@ -107,12 +114,71 @@ def ending(process: subprocess.Popen[Any]) -> str:
         process: One that has ended.
     """
     code = process.poll()
+    if process in _hung:
+        return f"it did nothing for {_hung[process]:.0f} s and was ended"
     if code is not None and code < 0:
         try:
             return f"ended by {signal.Signals(-code).name}"
         except ValueError:
             return f"ended by signal {-code}"
     return f"exit code {code}"
+
+
+def processor_ticks(number: int) -> int:
+    """Processor time that a process and its ended children have used [ticks]; 0 where the system does not tell.
+
+    Args:
+        number: Its process id.
+    """
+    return _look_at(number)[1]
+
+
+def _look_at(number: int) -> tuple[str, int]:
+    """State of a process (one letter, as in ``ps``) and its processor time [ticks]."""
+    try:
+        words = Path(f"/proc/{number}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
+        return words[0], sum(map(int, words[11:15]))
+    except (OSError, ValueError, IndexError):
+        return "", 0
+
+
+class Stillness:
+    """How long a helper that has something to do has done nothing: it is stopped, or waits for what never comes."""
+
+    def __init__(self, process: subprocess.Popen[Any]) -> None:
+        """Begin to look.
+
+        Args:
+            process: The helper.
+        """
+        self._process, self._ticks = process, 0
+        self.reset()
+
+    def reset(self) -> None:
+        """The helper showed that it lives, or has nothing to do."""
+        self._still_s, self._looked = 0.0, time.monotonic()
+
+    def end_after(self, limit_s: float) -> bool:
+        """Look at the helper; end it where it has used no processor time for so long.
+
+        Args:
+            limit_s: How long it may do nothing [s].
+
+        Returns:
+            Whether it was ended: it is to be treated as one that died.
+        """
+        now = time.monotonic()
+        state, ticks = _look_at(self._process.pid)
+        if ticks != self._ticks or state in {"", "Z", "X", "R", "D"}:  # it has ended, or waits for a core or a disk
+            self._ticks, self._still_s = ticks, 0.0
+        else:
+            self._still_s += min(now - self._looked, _LONGEST_LOOK_S)
+        self._looked = now
+        if self._still_s < limit_s:
+            return False
+        _hung[self._process] = self._still_s
+        self._process.kill()
+        return True
 
 
 def end_process(process: subprocess.Popen[Any], *, patience_s: float = 0.0) -> None:

@@ -1,7 +1,7 @@
 """Processes of this machine that share a piece of work.
 
 Each is connected by a pair of sockets: there is nothing with a name that could be left behind. A worker ends the moment
-its socket does; the piece of one that died is given to another.
+its socket does; the piece of one that died or hangs is given to another.
 """
 
 from __future__ import annotations
@@ -22,12 +22,15 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from rtsim.errors import OutputError
-from rtsim.processes import ROOT, end_process, ending, is_here, start_process
+from rtsim.processes import ROOT, Stillness, end_process, ending, is_here, start_process
 
 AHEAD = 4
 """Pieces per worker that may be done before the first of them is taken."""
 MOST_DEATHS = 3
 """A piece that ended as many workers is given up."""
+HANG_S = 90.0
+"""A worker that does nothing with its piece for so long is ended [s]; a law may sleep for a minute."""
+_LOOK_S = 1.0
 
 
 class WorkersDied(OutputError):
@@ -73,6 +76,7 @@ class _Worker:
                 stdin=subprocess.DEVNULL,
                 stdout=2,  # what a law prints must not come between the results of the command
             )
+        self.stillness = Stillness(self.process)
         self.connection = Connection(ours.detach())
         self.piece: int | None = None
         # What this process can import, a worker can; but nothing stands before what is installed.
@@ -96,8 +100,14 @@ class _Pool:
         for wanted in range(len(self._pieces)):
             while wanted not in self._done:
                 self._hand_out(wanted)
-                for connection in wait([worker.connection for worker in self._workers if worker.piece is not None]):
-                    self._collect(next(worker for worker in self._workers if worker.connection is connection))
+                busy = [worker for worker in self._workers if worker.piece is not None]
+                answered = wait([worker.connection for worker in busy], timeout=_LOOK_S)
+                for worker in busy:
+                    if worker.connection in answered:
+                        self._collect(worker)
+                    elif worker.stillness.end_after(HANG_S):
+                        assert worker.piece is not None
+                        self._replace(worker, worker.piece)
             result, failure = self._done.pop(wanted)
             if failure is not None:
                 kind, arguments, attributes, told = failure
@@ -110,6 +120,7 @@ class _Pool:
         for worker in self._workers:
             if worker.piece is None and self._todo and self._todo[0] < wanted + AHEAD * self._jobs:
                 worker.piece = self._todo.popleft()
+                worker.stillness.reset()
                 with contextlib.suppress(OSError):  # it died: that shows when its answer is read
                     worker.connection.send((self._function, self._pieces[worker.piece]))
 

@@ -66,7 +66,8 @@ class FlightScreen:
         Args:
             event: What happened.
         """
-        self._events.append(event)
+        if event.kind != "view":  # it has said that itself
+            self._events.append(event)
 
     @contextmanager
     def running(self) -> Iterator[None]:

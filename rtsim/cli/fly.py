@@ -234,7 +234,7 @@ def fly_command(
     )
     if json:
         places = {"log": log, "record": record}
-        given = {key: str(path) for key, path in places.items() if path is not None}
+        given = {key: str(path) for key, path in places.items() if path is not None and path.exists()}
         emit_json({**flight.summary(), "first_frame_s": first_frame_s, **given})
     _end(flight, code)
 

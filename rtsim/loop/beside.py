@@ -1,13 +1,14 @@
 """Compiles half of a first flight's kernels in a process beside it: they meet in the kernel cache.
 
 numba compiles under one lock, so threads do not help. The flight compiles the aircraft and the frame, this the pilot,
-the monitor and the limit watch. Should it fail, the flight compiles them itself.
+the monitor and the limit watch. Should it fail or hang, the flight compiles them itself.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import logging
 import os
 import subprocess
 from typing import Any
@@ -15,13 +16,15 @@ from typing import Any
 import numba
 
 from rtsim.kernels import progress, store
-from rtsim.processes import end_process, start_process
+from rtsim.processes import Stillness, end_process, ending, start_process
 
 _CONFIGURATION: Any = numba.config  # its names are made at run time
 CHILD = "RTSIM_COMPILES_BESIDE"
 """Set in the environment of the process beside."""
 KERNELS_ALONE, KERNELS_BESIDE = 107, 69
 """Kernels that a first flight of the LPV aircraft compiles: alone, and with a process beside it."""
+HANG_S = 10.0
+"""A process beside that does nothing for so long is ended [s]."""
 _wanted: list[str] = []
 _running: list[subprocess.Popen[bytes]] = []
 
@@ -68,8 +71,19 @@ def finish(plant: str) -> None:
         plant: ``lpv`` or ``nonlinear``.
     """
     for process in _running:
-        process.wait()
-        end_process(process)
+        stillness = Stillness(process)
+        code = None
+        while code is None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                code = process.wait(0.2)
+            if code is None and stillness.end_after(HANG_S):
+                break
+        end_process(process, patience_s=0.5)
+        if code != 0:
+            logging.getLogger(__name__).warning(
+                "The process that compiles beside the flight ended unexpectedly (%s); the flight compiles the rest.",
+                ending(process),
+            )
     _running.clear()
     if CHILD not in os.environ and not _CONFIGURATION.DISABLE_JIT and store.read(_marker(plant)) is None:
         store.write(_marker(plant), b"")

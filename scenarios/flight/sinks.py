@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -24,7 +24,11 @@ MEMORY_ROWS = 65_536
 """Rows of a history that are kept in memory besides those that came last, 32 MB: 4 minutes at 250 Hz."""
 _VIEW_PIECE = 64
 _VIEW_BACKLOG = 1024
-_DROPPED = [signal.name for signal in TIMING_SIGNALS].index("telemetry_dropped")
+_LATENESS, _DROPPED = (
+    [signal.name for signal in TIMING_SIGNALS].index(name) for name in ("lateness_us", "telemetry_dropped")
+)
+STANDSTILL_S = 1.0
+"""A paced flight that falls behind by so much from one frame to the next stood still [s]."""
 
 
 class RowLog(Protocol):
@@ -63,6 +67,11 @@ class RowView(Protocol):
     @property
     def dropped(self) -> int:
         """Rows the view was too slow to take."""
+        ...
+
+    @property
+    def messages(self) -> Sequence[str]:
+        """What it had to say so far: that it was started again, was given up, was closed."""
         ...
 
     def push(self, row: FloatArray, timing: FloatArray) -> None:
@@ -213,6 +222,8 @@ class FlightSinks:
         self.history = History()
         self.events: list[LogEvent] = []
         self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
+        self._view_told = 0
+        self._lateness_us = 0.0
         self._mirror = mirror
         self._watch_corridor = watch_corridor
         self._limits = limits(self.event) if limits is not None else None
@@ -233,6 +244,12 @@ class FlightSinks:
         if self._log is not None:
             self._log.push(row, timing)
             self._watch_log(self._log, row)
+        self._watch_view(row)
+        lateness_us = float(timing[_LATENESS])
+        if lateness_us - self._lateness_us > STANDSTILL_S * 1e6:
+            text = f"the flight stood still for {(lateness_us - self._lateness_us) * 1e-6:.1f} s"
+            self.event(LogEvent(int(row[COLUMN.frame]), float(row[COLUMN.time_s]), "standstill", text, "warning"))
+        self._lateness_us = lateness_us
         if self._watch_corridor and row[COLUMN.corridor_level] != self._level:
             self._tell_level(row)
         if self._limits is not None:
@@ -250,6 +267,7 @@ class FlightSinks:
             self._watch_log(self._log, rows[-1])
         if self._view is not None:
             self._show_block(self._view, rows)
+            self._watch_view(rows[-1])
         if self._watch_corridor:
             levels = rows[:, COLUMN.corridor_level]
             before = np.concatenate(([self._level], levels[:-1]))
@@ -288,6 +306,13 @@ class FlightSinks:
                 self.event(LogEvent(frame, time_s, "log_failed", str(log.failure), "warning"))
             while log.notes:
                 self.event(LogEvent(frame, time_s, "log_writer", log.notes.pop(0), "warning"))
+
+    def _watch_view(self, row: FloatArray) -> None:
+        """Make events of what the view said."""
+        if self._view is not None:
+            for text in self._view.messages[self._view_told :]:
+                self._view_told += 1
+                self.event(LogEvent(int(row[COLUMN.frame]), float(row[COLUMN.time_s]), "view", text, "warning"))
 
     def _show_block(self, view: RowView, rows: FloatArray) -> None:
         """Push rows no faster than the view takes them, so that a recording at full speed has no holes."""

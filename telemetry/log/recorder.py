@@ -1,6 +1,6 @@
 """The recording end of the flight log: rows and events go, without loss, to a process that writes them.
 
-A writer that dies is replaced: what it had not confirmed is kept here and given to the next one.
+A writer that dies or hangs is replaced: what it had not confirmed is kept here and given to the next one.
 
 Parquet is written by another process (``telemetry.log.recorder_worker``), since a busy thread in the loop's own process
 costs it half its frames. The rows travel through a pipe in batches of a fiftieth of a second. A live flight never
@@ -27,7 +27,7 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
 from rtsim.frame import SIGNAL_COUNT
-from rtsim.processes import end_process, ending, start_process
+from rtsim.processes import Stillness, end_process, ending, start_process
 from telemetry.exchange.ring import ROW_WIDTH
 from telemetry.log.format import FlightMetadata, LogEvent
 from telemetry.log.place import claim_log
@@ -61,6 +61,8 @@ _DRAINS_PER_LOOK = 10
 """How many drains pass between looks at the writer's answers."""
 _MOST_DEATHS = 3
 """A log whose writers die one after the other, having confirmed nothing, is given up."""
+HANG_S = 5.0
+"""A writer that takes nothing of what waits for it, and does nothing, for so long is ended and replaced [s]."""
 _ROW_BYTES = 8 * ROW_WIDTH
 _PIPE_BYTES = 1 << 20
 _SET_PIPE_SIZE = 1031  # F_SETPIPE_SZ of Linux, not named in Python 3.11's fcntl everywhere
@@ -198,6 +200,9 @@ class Recorder:
             try:
                 written = os.write(self._pipe, self._backlog[0])
             except BlockingIOError:
+                if self._stillness.end_after(HANG_S):
+                    self._replace_writer()
+                    continue
                 if self._live and wait_s is None:
                     return
                 select.select([self._answers], [self._pipe], [], 0.2)
@@ -208,6 +213,7 @@ class Recorder:
                 self._replace_writer()
             else:
                 progress = time.monotonic()
+                self._stillness.reset()
                 rest = self._backlog[0][written:]
                 if len(rest):
                     self._backlog[0] = rest
@@ -251,6 +257,7 @@ class Recorder:
             self._confirmed.to_json(),
             handed=[self._lock.fileno()],  # nobody else writes here before it has ended, should this process be killed
         )
+        self._stillness = Stillness(self._process)
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._pipe, self._answers = self._process.stdin.fileno(), self._process.stdout.fileno()
@@ -269,7 +276,7 @@ class Recorder:
             self._send(CLOSE, self._summary)
 
     def _replace_writer(self) -> None:
-        """Start another writer for one that died, and say so."""
+        """Start another writer for one that died or was ended, and say so."""
         self._read_answers()
         end_process(self._process, patience_s=1.0)
         self._deaths += 1
@@ -307,6 +314,7 @@ class Recorder:
             self._read_answers()
             if self._confirmed != before:
                 moved = time.monotonic()
+            self._stillness.end_after(HANG_S)
         self._read_answers()
         if process.poll() is None:
             self._fail(f"its writer did not finish within {timeout_s:.0f} s")

@@ -15,12 +15,11 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from pathlib import Path
 from typing import Any
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
-from rtsim.processes import end_process, ending, start_process
+from rtsim.processes import end_process, ending, processor_ticks, start_process
 from telemetry.exchange.ring import Ring
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.options import ViewOptions
@@ -73,6 +72,7 @@ class RerunView:
         }
         self._claims = [claim(options.record)] if options.record is not None else []
         self._record = options.record
+        self._began_unix_s = time.time()
         self._ring = Ring()
         self._pushes = 0
         self._starts = 0
@@ -164,34 +164,45 @@ class RerunView:
         if self._closed:
             return
         self._closed = True
-        process = self._process
-        if process is not None:
-            self._order({"close": True})
-            with contextlib.suppress(OSError):
-                process.stdin.close()  # type: ignore[union-attr]  # a pipe
-            signs, ticks = self._signs_of_progress(), 0
-            moved = wrote = time.monotonic()
-            while process.poll() is None and (now := time.monotonic()) < moved + timeout_s:
-                self._read_answers()
-                if (newest := self._signs_of_progress()) != signs:
-                    signs, moved, wrote = newest, now, now
-                elif (used := _processor_ticks(process.pid)) != ticks and now < wrote + _LONGEST_THOUGHT_S:
-                    ticks, moved = used, now
-                time.sleep(0.005)
-            self._read_answers()
-            if process.poll() is None:
-                self._end_process()
-                self._tell(f"The view did not get on with closing for {timeout_s:.0f} s and was ended.")
-                self._note_incomplete("the view did not close in time")
-            else:
-                end_process(process)
-                self._stderr.close()
-                self._process = None
+        if self._process is not None:
+            self._finish_process(self._process, timeout_s)
         self._ring.close()
         for held in self._claims:
             held.close()
+        if self._options.record is not None:
+            discard_empty(self._options.record)
         if self._record is not None:
             discard_empty(self._record)
+            if self.failure is not None:
+                self.failure = OutputError(f"{str(self.failure).rstrip('.')}; {self._what_there_is()}.")
+
+    def _finish_process(self, process: subprocess.Popen[bytes], timeout_s: float) -> None:
+        """Ask the view to end and wait for that; one that gets nowhere is ended."""
+        self._order({"close": True})
+        with contextlib.suppress(OSError):
+            process.stdin.close()  # type: ignore[union-attr]  # a pipe
+        signs, ticks = self._signs_of_progress(), 0
+        moved = wrote = time.monotonic()
+        while process.poll() is None and (now := time.monotonic()) < moved + timeout_s:
+            self._read_answers()
+            if (newest := self._signs_of_progress()) != signs:
+                signs, moved, wrote = newest, now, now
+            elif (used := processor_ticks(process.pid)) != ticks and now < wrote + _LONGEST_THOUGHT_S:
+                ticks, moved = used, now
+            time.sleep(0.005)
+        self._read_answers()
+        if process.poll() is None:
+            self._end_process()
+            self._tell(f"The view did not get on with closing for {timeout_s:.0f} s and was ended.")
+            self._note_incomplete("the view did not close in time")
+        else:
+            if process.returncode not in {0, GIVEN_UP}:
+                self._tell(f"The view ended unexpectedly ({ending(process)}{self._last_words()}).")
+            if process.returncode:
+                self._note_incomplete("the view ended in flight")
+            end_process(process)
+            self._stderr.close()
+            self._process = None
 
     def _signs_of_progress(self) -> tuple[object, ...]:
         """What changes while the view works: rows taken, bytes written, files finished."""
@@ -268,10 +279,20 @@ class RerunView:
 
     def _note_incomplete(self, why: str) -> None:
         if self._options.record is not None and self.failure is None:
-            partial = partial_name(self._options.record)
-            written = partial.exists() and partial.stat().st_size
-            rest = f"what there is stands beside it as {partial.name}" if written else "nothing was written"
-            self.failure = OutputError(f"{self._options.record}: the recording is incomplete because {why}; {rest}.")
+            self.failure = OutputError(f"{self._options.record}: the recording is incomplete because {why}.")
+
+    def _what_there_is(self) -> str:
+        """Every file of a recording that failed, in words."""
+        record = self._options.record
+        assert record is not None
+        written = [
+            place.name
+            for place in record.parent.glob("*.rrd")
+            if place.name.startswith((f"{record.stem}.", f"{record.stem}-"))
+            and place.stat().st_size
+            and place.stat().st_mtime > self._began_unix_s - 1.0  # a file system may keep whole seconds
+        ]
+        return f"what was recorded is in {', '.join(sorted(written))}" if written else "nothing was written"
 
     def _end_process(self) -> None:
         """Kill worker and viewer; neither could be asked."""
@@ -294,12 +315,3 @@ class RerunView:
         self.messages.append(message)
         if self._on_message is not None:
             self._on_message(message)
-
-
-def _processor_ticks(number: int) -> int:
-    """Processor time a process has used [ticks]; 0 where the system does not tell."""
-    try:
-        words = Path(f"/proc/{number}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-        return int(words[11]) + int(words[12])
-    except (OSError, ValueError, IndexError):
-        return 0

@@ -80,11 +80,9 @@ class Worker:
                 self._check()
             time.sleep(max(0.001, started + period - time.monotonic()))
         watched = self._viewer is not None and self._viewer.ended() is None
-        for partial in self._streamer.close(linger_s=0.4 if watched else 0.0):
+        if self._streamer.close(linger_s=0.4 if watched else 0.0):
             why = "it could not be written to its end (is the disk full?)"
-            _tell(
-                {"failure": f"{self._options.record}: the recording is incomplete because {why}; see {partial.name}."}
-            )
+            _tell({"failure": f"{self._options.record}: the recording is incomplete because {why}."})
         if self._viewer is not None and self._options.close_viewer:
             self._viewer.close()
 

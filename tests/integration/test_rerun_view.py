@@ -196,6 +196,20 @@ def test_a_view_that_is_killed_is_started_again(told: list[str], tmp_path: Path)
         assert view.wait_ready(30.0)
         fly(view, rows_of_a_conversion(0.5))
     assert (tmp_path / "flight-again2.rrd").exists()
+    there = ", ".join(sorted(path.name for path in tmp_path.glob("*.rrd")))
+    assert "flight-again2.rrd" in there
+    assert str(view.failure).endswith(f"; what was recorded is in {there}.")
+
+
+def test_a_view_that_is_killed_just_before_the_end_is_no_success(told: list[str], tmp_path: Path) -> None:
+    with viewing(ViewOptions(viewer=False, record=tmp_path / "flight.rrd"), told) as view:
+        assert view.wait_ready(30.0)
+        assert view._process is not None
+        view._process.kill()
+        view._process.wait()
+    assert told == ["The view ended unexpectedly (ended by SIGKILL)."]
+    assert view.failure is not None
+    assert not (tmp_path / "flight.rrd").exists()
 
 
 def test_a_view_that_is_frozen_at_the_end_is_ended_in_time(tmp_path: Path, told: list[str]) -> None:

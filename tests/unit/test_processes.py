@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import psutil
 import pytest
 
 from rtsim.errors import InputError
+from rtsim.loop import beside
 from rtsim.processes import end_process, ending, safe_environment, start_process
 from rtsim.worker_pool import WorkersDied, work
 
@@ -72,6 +74,13 @@ def die_once(marker: str) -> str:
     if not Path(marker).exists():
         Path(marker).write_text("died")
         os.kill(os.getpid(), signal.SIGKILL)
+    return "done"
+
+
+def hang_once(marker: str) -> str:
+    if not Path(marker).exists():
+        Path(marker).write_text("hangs")
+        os.kill(os.getpid(), signal.SIGSTOP)
     return "done"
 
 
@@ -154,6 +163,39 @@ def test_the_piece_of_a_worker_that_died_is_given_to_another(tmp_path: Path, cap
     assert [record.getMessage() for record in caplog.records] == [
         "A worker process died (ended by SIGKILL); another does its piece."
     ] * 4
+
+
+def test_the_piece_of_a_worker_that_hangs_is_given_to_another(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtsim.worker_pool.HANG_S", 1.0)
+    assert list(work(hang_once, [(str(tmp_path / "0"),), (str(tmp_path / "1"),)], jobs=2)) == ["done"] * 2
+    told = [record.getMessage() for record in caplog.records]
+    assert len(told) == 2
+    assert re.fullmatch(r"A worker process died \(it did nothing for \d+ s and was ended\); another .*", told[0])
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("import os; os.kill(os.getpid(), 19)", "it did nothing for"),
+        ("import os; os.kill(os.getpid(), 9)", "ended by SIGKILL"),
+        ("raise SystemExit(1)", "exit code 1"),
+        ("import time\nend = time.monotonic() + 1.5\nwhile time.monotonic() < end: pass", None),
+    ],
+)
+def test_a_flight_waits_for_what_compiles_beside_it_only_while_that_works(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, code: str, told: str | None
+) -> None:
+    monkeypatch.setattr(beside, "HANG_S", 0.5)
+    monkeypatch.setenv(beside.CHILD, "1")  # nothing is remembered
+    process = subprocess.Popen([sys.executable, "-c", code])
+    monkeypatch.setattr(beside, "_running", [process])
+    beside.finish("lpv")
+    assert process.returncode is not None
+    messages = [record.getMessage() for record in caplog.records]
+    assert len(messages) == (told is not None)
+    assert told is None or told in messages[0]
 
 
 def test_a_piece_that_ends_every_worker_is_given_up() -> None:

@@ -235,7 +235,8 @@ def test_writers_that_are_killed_are_replaced_and_the_log_is_whole(tmp_path: Pat
         recorder.event(event)
         recorder.push_block(rows[100 * number : 100 * number + 100])
         if number == 1:
-            wait_until((path / "part-000002.parquet").exists)  # something is confirmed, something is not
+            # Something is confirmed, something is not; part 1 may be all that was written before the first death.
+            wait_until(lambda: recorder._read_answers() or recorder._confirmed.parts >= 2)
         if number in {0, 1, 4}:
             recorder._process.kill()
             recorder._process.wait()
@@ -353,6 +354,27 @@ def test_a_writer_that_stays_stuck_is_given_up(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="did not finish"):
         recorder.close({}, timeout_s=0.5)
     assert time.monotonic() - start < 5.0
+
+
+@pytest.mark.parametrize("live", [True, False])
+@pytest.mark.parametrize("frames", [100, 6000])  # the pipe takes them all, or not
+def test_a_writer_that_hangs_is_replaced_and_nothing_is_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, live: bool, frames: int
+) -> None:
+    monkeypatch.setattr("telemetry.log.recorder.HANG_S", 0.5)
+    path = tmp_path / "flight.parquet"
+    rows = flight(frames)
+    recorder = Recorder(path, METADATA, live=live)
+    recorder.push(rows[0])
+    recorder._process.send_signal(signal.SIGSTOP)
+    for row in rows[1:]:
+        recorder.push(row)
+    recorder.close({"end_reason": "done"})
+    log = read_log(path)
+    assert np.array_equal(log.history, rows)
+    assert log.summary == {"end_reason": "done"}
+    assert len(recorder.notes) == 1
+    assert re.search(r"ended unexpectedly \(it did nothing for \d+ s and was ended\); another", recorder.notes[0])
 
 
 @pytest.mark.parametrize("place", ["missing/flight.parquet", "file/flight.parquet"])
