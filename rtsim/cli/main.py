@@ -215,7 +215,9 @@ def main() -> None:
     _open_closed_streams()
     leave_settings_of_others()
     stopping.catch_signals()
-    sys.exit(run())
+    code = run()
+    stopping.leave_at_once(code)
+    sys.exit(code)
 
 
 if __name__ == "__main__":
