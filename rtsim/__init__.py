@@ -28,7 +28,12 @@ Legend:
     x: The aircraft's state (nx,).
 """
 
-from rtsim.lazy import names_of
+from rtsim.early import end_by_signals
+
+end_by_signals()
+del end_by_signals
+
+from rtsim.lazy import names_of  # noqa: E402
 
 __version__ = "0.1.0"
 

@@ -362,7 +362,7 @@ def _fly(
 
 
 class StoppingSignals:
-    """Signals that end a command end a running flight cleanly; a second one ends the program at once."""
+    """Signals that end a command end a running flight cleanly; one ``CLOSING_S`` later ends the program at once."""
 
     def __init__(self, control: FlightControl) -> None:
         """Prepare; nothing is caught before :meth:`arm`.
@@ -390,12 +390,14 @@ class StoppingSignals:
             signal.signal(number, handler)
 
     def _handle(self, number: int, _frame: FrameType | None) -> None:
-        if self.received is not None:
-            self.disarm()
-            os.kill(os.getpid(), number)
-            return
         if number == signal.SIGHUP:
             stopping.leave_terminal()
+        if self.received is not None:
+            if not stopping.disturbs():
+                self.disarm()
+                os.kill(os.getpid(), self.received)
+            return
+        stopping.begin_closing(number)
         self.received = signal.Signals(number)
         name = "Ctrl-C" if number == signal.SIGINT else self.received.name
         self._control.stop(f"stopped by {name}")

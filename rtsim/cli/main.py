@@ -218,7 +218,9 @@ def main() -> None:
     _open_closed_streams()
     leave_settings_of_others()
     stopping.catch_signals()
-    _leave(run())
+    code = run()
+    stopping.leave_at_once(code)
+    _leave(code)
 
 
 def _leave(code: int) -> NoReturn:

@@ -2,6 +2,9 @@
 
 Raised where Python runs inside somebody else's callback (a compiler's, a destructor), an exception is thrown away. That
 is noticed, and it is raised again a moment later, as often as it takes.
+
+Once a command unwinds, further signals are ignored for ``CLOSING_S``, so that they do not cut off what it closes; one
+that comes later ends it at once. The exit code is that of the first.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import select
 import signal
 import sys
 import threading
+import time
 import weakref
 from types import FrameType
 from typing import Any
@@ -21,6 +25,8 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 """Ctrl-C, a polite end, a closed terminal, Ctrl-Backslash."""
 AGAIN_S = 0.05
 """How soon an exception that was thrown away is raised again [s]."""
+CLOSING_S = 2.0
+"""For how long after a signal others are ignored [s]."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,6 +35,8 @@ class Interrupted(KeyboardInterrupt):
 
 _newest: list[tuple[int, weakref.ref[BaseException]]] = []
 """The signal that asked the process to end, and what was raised for it."""
+_closing: list[tuple[int, float]] = []
+"""The first such signal, and until when others are ignored, monotonic [s]."""
 
 
 def exit_code(number: int) -> int:
@@ -50,23 +58,54 @@ def catch_signals() -> None:
     for number in SIGNALS:
         # Shells start background jobs with SIGINT ignored; a flight must still end cleanly when it is asked to.
         if number == signal.SIGINT or signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, raise_stop)
+            signal.signal(number, _handle)
     sys.unraisablehook = _notice_loss
 
 
-def raise_stop(number: int, frame: FrameType | None = None) -> None:  # noqa: ARG001 - signature of a handler
-    """Unwind.
+def begin_closing(number: int) -> None:
+    """A signal ends the command: let no other disturb that for a while.
 
     Args:
         number: The signal.
-        frame: Where it came.
+    """
+    _closing[:] = [(_closing[0][0] if _closing else number, time.monotonic() + CLOSING_S)]
+
+
+def disturbs() -> bool:
+    """Whether a signal that comes now is to be ignored."""
+    return bool(_closing) and time.monotonic() < _closing[0][1]
+
+
+def leave_at_once(code: int) -> None:
+    """All is closed: a signal that comes while the interpreter ends changes nothing.
+
+    Args:
+        code: The exit code.
+    """
+    for number in SIGNALS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, lambda *_: os._exit(code))
+
+
+def _handle(number: int, _frame: FrameType | None) -> None:
+    if number == signal.SIGHUP:
+        leave_terminal()
+    if not disturbs():
+        raise_stop(number)
+
+
+def raise_stop(number: int) -> None:
+    """Unwind, for the first signal that came.
+
+    Args:
+        number: The signal.
 
     Raises:
         Interrupted: Ctrl-C.
         Terminated: Any other.
     """
-    if number == signal.SIGHUP:
-        leave_terminal()
+    begin_closing(number)
+    number = _closing[0][0]
     stop = Interrupted() if number == signal.SIGINT else Terminated(number)
     _newest[:] = [(number, weakref.ref(stop))]
     try:
@@ -97,6 +136,7 @@ def leave_terminal() -> None:
 def _notice_loss(loss: Any) -> None:
     """An exception was thrown away: as usual, unless it is ours."""
     if issubclass(loss.exc_type, (Interrupted, Terminated)):
+        _closing[:] = [(_newest[-1][0], 0.0)]
         again = threading.Timer(AGAIN_S, os.kill, (os.getpid(), _newest[-1][0]))
         again.daemon = True
         again.start()
