@@ -62,19 +62,19 @@ def test_claims_carry_numbers_and_verdicts(reproduced):
     assert not claims["text_lpv_accuracy"]["holds"]
 
 
-def test_a_file_in_the_way_is_bad_input(tmp_path):
+def test_a_file_in_the_way_is_told(tmp_path):
     target = tmp_path / "taken"
     target.write_text("", encoding="utf-8")
     ended = run("--out", target)
-    assert ended.returncode == 2
-    assert "name a directory" in ended.stderr
+    assert ended.returncode == 4
+    assert "taken is no folder" in ended.stderr
     assert "Traceback" not in ended.stderr
 
 
 def test_a_directory_that_cannot_be_made_is_told(tmp_path):
     ended = run("--out", Path("/proc/nowhere"))
     assert ended.returncode == 4
-    assert "choose another directory" in ended.stderr
+    assert "/proc/nowhere: cannot be written" in ended.stderr
 
 
 def test_ctrl_c_ends_it_cleanly(tmp_path):

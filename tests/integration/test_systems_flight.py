@@ -257,7 +257,7 @@ def test_a_database_with_other_variables_cannot_be_flown(tmp_path: Path) -> None
     shipped = load_database()
     states = (dataclasses.replace(shipped.states[0], unit="kn"), *shipped.states[1:])
     save_database(dataclasses.replace(shipped, states=states), file)
-    with pytest.raises(InputError, match=r"'u' has another unit.*got 'kn'.*m/s"):
+    with pytest.raises(InputError, match=r"'u' is in another unit.*got 'kn'.*m/s"):
         Simulation(hold(60, 75, database=str(file)))
 
 
