@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any
 
 from rtsim.errors import InputError, closest, suggestion
-from rtsim.guests import Visit, words_of
+from rtsim.guests import GuestError, visited
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +76,10 @@ def make_plugin(target: Callable[[], Any], name: str, kind: PluginKind) -> Any:
         InputError: Its class wants arguments or failed.
     """
     try:
-        with Visit():
-            return target()
-    except (Exception, SystemExit) as error:
+        return visited(target)
+    except GuestError as error:
         raise InputError(
-            f"the {kind.noun.partition(' ')[2]} cannot be made: {words_of(error)}",
+            f"the {kind.noun.partition(' ')[2]} cannot be made: {error}",
             key=kind.option,
             value=name,
             mend="its class must take no arguments",
@@ -114,20 +113,19 @@ def _from_module(name: str, kind: PluginKind) -> Any:
     if not (module_name and class_name):
         raise InputError("is half a name", key=kind.option, value=name, mend="write MODULE:CLASS")
     try:
-        with Visit():
-            module = _imported(module_name, str(Path.cwd()))
-    except ModuleNotFoundError as error:
-        missing = error.name or module_name
-        own = module_name == missing or module_name.startswith(f"{missing}.")
+        module = visited(_imported, module_name, str(Path.cwd()))
+    except GuestError as error:
+        if isinstance(error.__cause__, ModuleNotFoundError):
+            missing = error.__cause__.name or module_name
+            own = module_name == missing or module_name.startswith(f"{missing}.")
+            raise InputError(
+                f"there is no module {missing}" if own else f"its module needs {missing}, which is not installed",
+                key=kind.option,
+                value=name,
+                mend="name a module of the current directory or an installed one" if own else f"install {missing}",
+            ) from error
         raise InputError(
-            f"there is no module {missing}" if own else f"its module needs {missing}, which is not installed",
-            key=kind.option,
-            value=name,
-            mend="name a module of the current directory or an installed one" if own else f"install {missing}",
-        ) from error
-    except (Exception, SystemExit) as error:
-        raise InputError(
-            f"the module {module_name} cannot be imported: {words_of(error)}",
+            f"the module {module_name} cannot be imported: {error}",
             key=kind.option,
             value=name,
             mend="correct the module",
@@ -166,11 +164,10 @@ def _from_entry_point(name: str, kind: PluginKind) -> Any:
             mend=suggestion(name, choices, otherwise="choose one"),
         )
     try:
-        with Visit():
-            return offered[name].load()
-    except (Exception, SystemExit) as error:
+        return visited(offered[name].load)
+    except GuestError as error:
         raise InputError(
-            f"the entry point cannot be loaded: {words_of(error)}",
+            f"the entry point cannot be loaded: {error}",
             key=kind.option,
             value=name,
             mend="reinstall the package that offers it",

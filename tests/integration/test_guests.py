@@ -153,6 +153,23 @@ def test_whatever_a_pilot_or_nacelle_law_raises_is_told(option, name, code, word
     assert json.loads(told.out)["frames"] > 0
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "class Own(BaseException): pass\nraise Own",
+        "class Law:\n    def __init__(self): raise GeneratorExit\n    def step(self, *given): pass",
+    ],
+)
+def test_whatever_a_module_or_class_raises_is_one_sentence(text, folder, capsys):
+    (folder / "hardmodule.py").write_text(text, encoding="utf-8")
+    for option in ("--pilot", "--nacelle", "--protection"):
+        assert run(["fly", "hover", "--headless", "--speed", "max", option, "hardmodule:Law"]) == 2
+        told = capsys.readouterr().err
+        assert told.count("rtsim: error: ") == 1
+        assert "Traceback" not in told
+        sys.modules.pop("hardmodule", None)
+
+
 def test_threads_and_closed_streams_of_a_guest_keep_nobody(folder):
     ended = command(
         "fly", "hover", "--headless", "--speed", "max", "--duration", "1", "--pilot", "guestlaws:Stays", "--json"
