@@ -31,6 +31,18 @@ _MARKS = {b"\xff\xfe\x00\x00": "UTF-32", b"\x00\x00\xfe\xff": "UTF-32", b"\xff\x
 _LONGEST_REASON = 200
 
 
+def status_of(place: Path) -> os.stat_result | None:
+    """Look once at what is at a place, or None where nothing is: what is asked twice may have changed meanwhile.
+
+    Args:
+        place: The place; links are followed.
+    """
+    try:
+        return place.stat()
+    except FileNotFoundError:
+        return None
+
+
 def named(path: str | os.PathLike[str]) -> Path:
     """The path that somebody gave.
 

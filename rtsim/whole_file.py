@@ -19,6 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rtsim.errors import OutputError
+from rtsim.outside import status_of
 
 
 @contextmanager
@@ -111,7 +112,8 @@ def _is_special(target: Path) -> bool:
 def _new_file(target: Path) -> Path:
     """Make an empty file beside the target, under a name that follows no link, with the permissions of the target."""
     name = f".{target.stem[:100]}.{secrets.token_hex(8)}.part{target.suffix[:20]}"
-    mode = target.stat().st_mode & 0o777 if target.exists() else 0o666
+    there = status_of(target)
+    mode = there.st_mode & 0o777 if there else 0o666
     temporary = target.with_name(name)
     os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0), mode))
     return temporary

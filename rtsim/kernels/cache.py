@@ -86,5 +86,6 @@ def cache_folder(root: Path) -> Path | None:
 def _forget_old(parent: Path) -> None:
     limit = time.time() - FORGOTTEN_AFTER_S
     for folder in parent.iterdir():
-        if folder.is_dir() and folder.stat().st_mtime < limit:
-            shutil.rmtree(folder, ignore_errors=True)
+        with contextlib.suppress(FileNotFoundError):  # another process forgets the same ones
+            if folder.is_dir() and folder.stat().st_mtime < limit:
+                shutil.rmtree(folder, ignore_errors=True)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rtsim.errors import InputError, OutputError
+from rtsim.outside import status_of
 from rtsim.whole_file import check_writable
 
 _MAGIC = b"RRF"
@@ -56,7 +57,7 @@ def claim(record: Path) -> BinaryIO:
         raise OutputError(f"{partial}: cannot be written: {failure.strerror}.") from failure
     with contextlib.suppress(BlockingIOError):
         fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if partial.exists() and _is_at(held, partial):
+        if _is_at(held, partial):
             return held
     held.close()
     raise InputError(
@@ -88,7 +89,8 @@ def claim_next(record: Path, word: str, number: int) -> tuple[Path, BinaryIO]:
 def discard_empty(record: Path) -> None:
     """Take away the partial file of a recording that nothing was written to."""
     with contextlib.suppress(OSError):
-        if partial_name(record).stat().st_size == 0:
+        there = status_of(partial_name(record))
+        if there and there.st_size == 0:
             partial_name(record).unlink()
 
 
@@ -104,4 +106,5 @@ def _may_be_replaced(place: Path) -> bool:
 
 def _is_at(held: BinaryIO, place: Path) -> bool:
     """Whether an open file still has this name: a flight that ended meanwhile may have renamed it."""
-    return os.path.samestat(os.fstat(held.fileno()), place.stat())
+    there = status_of(place)
+    return there is not None and os.path.samestat(os.fstat(held.fileno()), there)

@@ -19,6 +19,7 @@ from typing import Any
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import OutputError
+from rtsim.outside import status_of
 from rtsim.processes import end_process, ending, processor_ticks, start_process
 from telemetry.exchange.ring import Ring
 from telemetry.log.corridor_outline import CorridorOutline
@@ -164,11 +165,15 @@ class RerunView:
         if self._closed:
             return
         self._closed = True
-        if self._process is not None:
-            self._finish_process(self._process, timeout_s)
-        self._ring.close()
-        for held in self._claims:
-            held.close()
+        try:
+            if self._process is not None:
+                self._finish_process(self._process, timeout_s)
+        finally:
+            if self._process is not None:
+                self._end_process()
+            self._ring.close()
+            for held in self._claims:
+                held.close()
         if self._options.record is not None:
             discard_empty(self._options.record)
         if self._record is not None:
@@ -207,7 +212,7 @@ class RerunView:
     def _signs_of_progress(self) -> tuple[object, ...]:
         """What changes while the view works: rows taken, bytes written, files finished."""
         places = (self._record, partial_name(self._record)) if self._record is not None else ()
-        sizes = [place.stat().st_size if place.exists() else -1 for place in places]
+        sizes = [there.st_size if (there := status_of(place)) else -1 for place in places]
         return (self._ring.consumed, self._ring.heartbeat, *sizes)
 
     def _start(self) -> None:
@@ -289,8 +294,9 @@ class RerunView:
             place.name
             for place in record.parent.glob("*.rrd")
             if place.name.startswith((f"{record.stem}.", f"{record.stem}-"))
-            and place.stat().st_size
-            and place.stat().st_mtime > self._began_unix_s - 1.0  # a file system may keep whole seconds
+            and (there := status_of(place))
+            and there.st_size
+            and there.st_mtime > self._began_unix_s - 1.0  # a file system may keep whole seconds
         ]
         return f"what was recorded is in {', '.join(sorted(written))}" if written else "nothing was written"
 

@@ -13,7 +13,11 @@ import pytest
 
 from rtsim.cli.main import run
 from rtsim.errors import EXIT_OUTPUT_FAILED, OutputError
+from rtsim.outside import status_of
 from rtsim.whole_file import check_writable, whole_file, write_whole
+from telemetry.view.options import ViewOptions
+from telemetry.view.recording import claim, discard_empty, partial_name
+from telemetry.view.view import RerunView
 
 
 def test_what_is_no_regular_file_is_written_to(tmp_path):
@@ -154,3 +158,22 @@ def test_a_bundle_replaces_a_bundle_and_nothing_else(tmp_path, monkeypatch):
     Path("b/mine/thesis.docx").write_text("dear")
     assert run(["test", "mine.toml", "--out", "b"]) == EXIT_OUTPUT_FAILED
     assert os.listdir("b") == ["mine"]  # noqa: PTH208
+
+
+def test_a_place_is_looked_at_once(tmp_path, monkeypatch):
+    """What vanishes between two looks ended a flight: the view renames its recording while the flight looks."""
+    record = tmp_path / "x.rrd"
+    partial_name(record).write_bytes(b"")
+    claim(record).close()
+    discard_empty(record)
+    monkeypatch.setattr(Path, "exists", lambda *_: True)  # as it was a moment ago
+    discard_empty(record)
+    assert status_of(partial_name(record)) is None
+    view = RerunView(ViewOptions(viewer=False, record=record))
+    partial_name(record).unlink()
+    assert view._signs_of_progress()[2:] == (-1, -1)
+    process = view._process
+    monkeypatch.setattr(RerunView, "_finish_process", lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        view.close()
+    assert process.poll() is not None  # no worker outlives a close that fails

@@ -21,7 +21,7 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.files.assemble import LARGEST_FILE
 from rtsim.lpv.files.mat import read_mat, write_mat
 from rtsim.lpv.files.netcdf import SHIPPED, read_database, write_database
-from rtsim.outside import regular_file
+from rtsim.outside import regular_file, status_of
 
 
 def load_database(path: str | Path | None = None) -> Database:
@@ -41,17 +41,17 @@ def load_database(path: str | Path | None = None) -> Database:
     missing = "run 'rtsim model build'" if path is None else "check the path"
     file = regular_file(SHIPPED if path is None else path, noun="database", largest=LARGEST_FILE, missing=missing)
     beside = file.with_name(file.stem + OWN_SUFFIX)
-    return _read_once(file, _state(file), beside, _state(beside) if beside.exists() else None)
+    return _read_once(file, _state(file), beside, _state(beside))
 
 
-def _state(file: Path) -> str:
-    """What changes with a file."""
-    stat = file.stat()
-    return f"{stat.st_ino} {stat.st_size} {stat.st_mtime_ns} {stat.st_ctime_ns}"
+def _state(file: Path) -> str | None:
+    """What changes with a file; None where there is none."""
+    stat = status_of(file)
+    return None if stat is None else f"{stat.st_ino} {stat.st_size} {stat.st_mtime_ns} {stat.st_ctime_ns}"
 
 
 @functools.lru_cache(maxsize=4)
-def _read_once(file: Path, _modified: str, beside: Path, profile_modified: str | None) -> Database:
+def _read_once(file: Path, _modified: str | None, beside: Path, profile_modified: str | None) -> Database:
     """Keep what was read: its arrays are read-only, and a batch of flights asks for it again and again."""
     return _read(file, None if profile_modified is None else beside)
 
