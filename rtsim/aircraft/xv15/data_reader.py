@@ -6,7 +6,7 @@ leaves here is SI and uses the nacelle angle (90 helicopter, 0 airplane).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from rtsim.aircraft.xv15.tables import (
     WingTables,
 )
 from rtsim.arrays import FloatArray
+from rtsim.errors import InputError
 from rtsim.toml_file import shipped_toml
 from rtsim.units import FOOT, INCH, KNOT, POUND, SLUG, SLUG_FOOT_SQUARED, deg, rpm
 
@@ -236,9 +237,31 @@ def _mass(data: Data, choices: Data) -> MassTables:
     )
 
 
-def load_tables() -> AircraftTables:
-    """Tables of the XV-15 at 13000 lb, sea level, 589 rpm and the flap schedule."""
+def _change(data: Data, choices: Data, name: str, value: object) -> None:
+    """Put one value in the place of another, as named by tables and key."""
+    *tables, key = name.split(".")
+    for source in (choices, data):
+        table: Any = source
+        for part in tables:
+            table = table.get(part, {})
+        if key in table:
+            table[key] = value
+            return
+    raise InputError("the aircraft's data have no such entry", key=name, mend="name it as in model_choices.toml")
+
+
+def load_tables(changes: Mapping[str, Any] | None = None) -> AircraftTables:
+    """Tables of the XV-15 at 13000 lb, sea level, 589 rpm and the flap schedule.
+
+    Args:
+        changes: Other values of our choices or of the sourced inputs, by ``table.key`` as in the data files.
+
+    Raises:
+        InputError: There is no such entry.
+    """
     data, choices = read_data()
+    for name, value in (changes or {}).items():
+        _change(data, choices, name, value)
     rotor_speed = rpm(data["rotor"]["rpm_heli_conversion"])
     # The same function as Xv15.at, so that a trim there is an equilibrium here to the last digit.
     density, sound_speed = standard_atmosphere(0.0)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +29,21 @@ class Xv15:
     _work: FloatArray = field(default_factory=lambda: np.zeros(kernels.WORK_COUNT + 6 * len(STATES)), repr=False)
 
     @staticmethod
-    def load() -> Xv15:
-        """The aircraft at 13000 lb, sea level, 589 rpm with its flap schedule."""
-        return Xv15(_cached_tables())
+    def load(changes: Mapping[str, Any] | None = None) -> Xv15:
+        """The aircraft at 13000 lb, sea level, 589 rpm with its flap schedule.
+
+        Args:
+            changes: Other values of our choices or of the sourced inputs, by ``table.key`` as in the data files
+                (``rotor.induced_power_factor``).
+
+        Raises:
+            InputError: There is no such entry.
+        """
+        if not changes:
+            return Xv15(_cached_tables())
+        from rtsim.aircraft.xv15.data_reader import load_tables
+
+        return Xv15(packed(load_tables(changes)))
 
     def at(self, condition: Condition) -> Xv15:
         """The same aircraft with the condition's mass, air, rotor speed and flap."""
