@@ -29,6 +29,7 @@ COMMAND_MODULES = (
     "fly",
     "replay",
     "analysis",
+    "rotor",
     "corridor",
     "pilot",
     "model",
