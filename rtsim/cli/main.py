@@ -40,6 +40,7 @@ COMMAND_MODULES = (
     "campaign",
     "optimize",
     "reproduce",
+    "validate",
     "joystick",
 )
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
