@@ -79,10 +79,7 @@ class Xv15:
         """Force along body x and z [N] and moment about the centre of gravity [N m] of each component."""
         self.derivative(x, u, nacelle_angle)
         start = kernels.COMPONENT
-        return {
-            name: self._work[start + 3 * i : start + 3 * i + 3].copy()
-            for i, name in enumerate(("rotors", "wing", "body", "tail"))
-        }
+        return {name: self._work[start + 3 * i : start + 3 * i + 3].copy() for i, name in enumerate(kernels.COMPONENTS)}
 
     def trim(self, condition: Condition, guess: TrimPoint | None = None) -> TrimPoint:
         """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.
