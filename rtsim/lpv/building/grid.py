@@ -1,8 +1,8 @@
 """The grid of the shipped database: its axes, and which part of it is worth solving.
 
 The spacing is what the paper's own density check asks for (see ``rtsim.lpv.building.checks``): 5 kn below 60 kn,
-3.5 kn where the low side of the corridor nears stall (74 to 109 kn), 7 kn to 130 kn, 10 kn above, and 2.5 kn where the
-flaps retract on the downstop; nacelle 2.5 deg above 60 deg, 5 deg below.
+2.5 kn about hover, where the fore-and-aft inflow gradient fades in, 3.5 kn where the low side of the corridor nears
+stall (60 to 109 kn), 7 kn to 130 kn, 10 kn above, and 2.5 kn where the flaps retract on the downstop; nacelle 2.5 deg above 60 deg, 5 deg below.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from rtsim.units import DEGREE, KNOT, deg, kt
 
 AIRSPEED_KT = np.concatenate(
     [
-        np.arange(-20.0, 60.0, 5.0),
-        [60.0, 67.0],
-        np.arange(74.0, 109.0, 3.5),
+        np.arange(-20.0, -5.0, 5.0),
+        np.arange(-5.0, 7.5, 2.5),
+        np.arange(10.0, 60.0, 5.0),
+        np.arange(60.0, 109.0, 3.5),
         [109.0, 116.0, 123.0],
         np.arange(130.0, 170.0, 10.0),
         np.arange(170.0, 180.0, 2.5),
