@@ -214,7 +214,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         corridor=_corridor_tables(corridor, database),
         pilot=pilot,
         flaps=load_flap_tables(profile),
-        drive=load_drive_tables(profile, governed_speed=database.rotor_speed),
+        drive=load_drive_tables(profile, governed_speed=database.governed_speed),
         aids=design_aids(database),
         gusts=gust_tables(setup.air, profile),
         faults=fault_tables(setup.faults, profile),

@@ -110,7 +110,7 @@ def _ratings(database: str) -> Ratings:
         hover_torque_inlb=torque.takeoff / INCH_POUND,
         hover_nacelle_deg=to_deg(torque.takeoff_nacelle),
         hover_airspeed_kt=to_kt(torque.takeoff_airspeed),
-        rotor_speed_rpm=to_rpm(aircraft.rotor_speed) if aircraft.rotor_speed > 0.0 else Ratings().rotor_speed_rpm,
+        rotor_speed_rpm=to_rpm(aircraft.governed_speed) if aircraft.governed_speed > 0.0 else Ratings().rotor_speed_rpm,
     )
 
 

@@ -18,6 +18,7 @@ from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import packed
+from rtsim.units import rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,13 @@ class Xv15:
             flap=-1.0 if condition.flap is None else condition.flap,
         )
         return Xv15(self.tables._replace(configuration=configuration))
+
+    @property
+    def airplane_rotor_speed(self) -> float:
+        """Rotor speed of airplane mode [rad/s]."""
+        from rtsim.aircraft.xv15.data_reader import read_data
+
+        return rpm(read_data()[0]["rotor"]["rpm_airplane"])
 
     def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
         """State derivative.
