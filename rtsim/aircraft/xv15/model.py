@@ -64,7 +64,7 @@ class Xv15:
         """Rotor speed of airplane mode [rad/s]."""
         from rtsim.aircraft.xv15.data_reader import read_data
 
-        return rpm(read_data()[0]["rotor"]["rpm_airplane"])
+        return float(rpm(read_data()[0]["rotor"]["rpm_airplane"]))
 
     def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
         """State derivative.
