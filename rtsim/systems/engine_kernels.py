@@ -67,6 +67,17 @@ def thrust_over_solidity(tables: EngineTables, thrust: float, rotor_speed: float
 
 
 @inner_kernel
+def advance_ratio(tables: EngineTables, across: float, rotor_speed: float) -> float:
+    """Speed of the air across the disc over tip speed [-]; 0 where the rotor's size is not known.
+
+    Args:
+        across: That speed, along the body's plane of symmetry and square to the mast [m/s].
+        rotor_speed: Rotor speed [rad/s].
+    """
+    return abs(across) / (rotor_speed * tables.radius) if tables.radius > 0.0 else 0.0
+
+
+@inner_kernel
 def burn(state: FloatArray, flow: float, dt: float) -> bool:
     """Take the fuel of one frame from the tanks.
 
