@@ -251,7 +251,7 @@ def test_a_new_limit_needs_the_kernel_and_the_data_alone(tmp_path):
     """A toy limit has its margin, level, unit and number wherever limits are."""
     text = (ROOT / "rtsim/protection/monitor_kernels.py").read_text(encoding="utf-8")
     for place, line in (
-        ('    "sink": "sink rate",\n', '    "climb": "climb rate",\n'),
+        ('    "rotor_endurance": "rotor endurance",\n', '    "climb": "climb rate",\n'),
         ("LIMIT_NUMBERS = {\n", '    "climb": ("climb_m_s", 0.0, 100.0),\n'),
         (
             "    nz = sensors[SENSOR.load_factor]\n",
