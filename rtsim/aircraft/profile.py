@@ -190,9 +190,15 @@ def _xv15_profile() -> AircraftProfile:
     document = shipped_toml(XV15_DATA, "profile.toml")
     parts: dict[str, Any] = {}
     for part in PARTS:
-        named = isinstance(document[part], str)
-        file = document[part] if named else "profile.toml"
-        parts[part] = Part(part, f"xv15/data/{file}", shipped_toml(XV15_DATA, file) if named else document[part])
+        given = document[part]
+        files = [given] if isinstance(given, str) else given if isinstance(given, list) else []
+        data: dict[str, Any] = {} if files else given
+        sources: dict[str, str] = {}
+        for file in files:
+            content = shipped_toml(XV15_DATA, file)
+            sources |= content.get("sources", {})
+            data = data | content | ({"sources": sources} if sources else {})
+        parts[part] = Part(part, f"xv15/data/{', '.join(files) or 'profile.toml'}", data)
     return AircraftProfile(name=document["name"], file="xv15/data/profile.toml", **parts)
 
 

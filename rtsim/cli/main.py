@@ -29,6 +29,7 @@ COMMAND_MODULES = (
     "fly",
     "replay",
     "analysis",
+    "performance",
     "corridor",
     "pilot",
     "model",

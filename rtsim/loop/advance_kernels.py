@@ -24,6 +24,7 @@ from rtsim.pilot.layout_kernels import TARGET
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
 from rtsim.systems.drive_kernels import DEVIATION, drive_advance, engine_power
+from rtsim.systems.engine_kernels import burn
 from rtsim.systems.flap_kernels import flap_advance
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
@@ -283,6 +284,19 @@ def disturb(flight: Flight, elapsed: float, normals: FloatArray) -> None:
         call_at(flight.parts[PART.air], flight, elapsed, normals)
     if faults_act(flight):
         call_at(flight.parts[PART.faults], flight)
+
+
+@inner_kernel
+def burn_fuel(flight: Flight) -> None:
+    """Take what the engines burned in this frame from the tanks; with nothing left they stop, for good.
+
+    Args:
+        flight: The flight with the failures of the next frame, which mend no engine that has no fuel.
+    """
+    state = flight.state
+    if burn(state.tank, flight.scratch.si[QUANTITY.fuel_flow], flight.tables.dt):
+        state.faults[FAULT.engine], state.faults[FAULT.power] = 1.0, 0.0
+        state.clock[CLOCK.faults] = 1.0
 
 
 @inner_kernel

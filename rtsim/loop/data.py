@@ -18,6 +18,7 @@ from rtsim.pilot.pilot_kernels import PilotTables
 from rtsim.places import Places
 from rtsim.protection.law_data import ProtectionTables
 from rtsim.systems.drive_kernels import DriveTables
+from rtsim.systems.engine_kernels import EngineTables
 from rtsim.systems.flap_kernels import FlapTables
 
 MODE = Places("mocm", "external", "hold")
@@ -111,6 +112,8 @@ class SimulationTables(NamedTuple):
     """What moves the flaps."""
     drive: DriveTables
     """What turns the rotors."""
+    engine: EngineTables
+    """Power that the engines have, fuel that they burn."""
     aids: AidTables
     """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
     bare aircraft, nor on controls that are held."""
@@ -156,6 +159,8 @@ class SimulationState(NamedTuple):
     drive: FloatArray
     """Rotor speed less the governed one, engine power, its offset from the throttle's law, whether governed, throttle
     trim."""
+    tank: FloatArray
+    """Fuel left and what the tanks hold, ``TANK``."""
     gusts: FloatArray
     """Turbulence filters, gusts that act or are to come, and what acts now."""
     faults: FloatArray

@@ -10,7 +10,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import corridor_margins
-from rtsim.faults.fault_kernels import fault_airspeed_error, fault_mask, fault_nacelle_ok
+from rtsim.faults.fault_kernels import FAULT, fault_airspeed_error, fault_mask, fault_nacelle_ok
 from rtsim.frame import QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell_below
@@ -20,6 +20,7 @@ from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.systems.drive_kernels import DEVIATION, engine_power
+from rtsim.systems.engine_kernels import TANK, advance_ratio, fuel_flow, takeoff_power, thrust_over_solidity
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
 
 
@@ -137,6 +138,28 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.gust_w] = gusts[GUST.w]
     si[QUANTITY.gust_q] = gusts[GUST.q]
     si[QUANTITY.failures] = float(fault_mask(state.faults))
+    across = ahead * math.sin(angle) + below * math.cos(angle)
+    si[QUANTITY.advance_ratio] = advance_ratio(tables.engine, across, rotor_speed)
+    si[QUANTITY.thrust_coefficient_over_solidity] = thrust_over_solidity(tables.engine, y[OUTPUT.thrust], rotor_speed)
+    _reckon_engines(flight, engine_power(state.drive, power))
+
+
+@inner_kernel
+def _reckon_engines(flight: Flight, shaft: float) -> None:
+    """Find the fuel left, what the engines burn, and what power they have.
+
+    Args:
+        shaft: Shaft power that they give [W].
+    """
+    tables, state, si = flight.tables, flight.state, flight.scratch.si
+    engine, fuel = tables.engine, state.tank[TANK.fuel]
+    altitude = engine.ground + state.x[STATE.altitude]
+    available = takeoff_power(engine, altitude)
+    if state.faults[FAULT.engine] != 0.0:
+        available = min(available, state.faults[FAULT.power])
+    si[QUANTITY.fuel] = fuel
+    si[QUANTITY.fuel_flow] = fuel_flow(engine, shaft, altitude) if fuel > 0.0 else 0.0
+    si[QUANTITY.engine_power_available] = available / tables.drive.efficiency
 
 
 @inner_kernel

@@ -45,7 +45,7 @@ from rtsim.loop.data import (
     SimulationTables,
 )
 from rtsim.loop.flying import Flying, Measure, new_streams
-from rtsim.loop.options import FlightOptions
+from rtsim.loop.options import FULL_TANKS, FlightOptions, declared
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
@@ -69,6 +69,7 @@ from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
 from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
+from rtsim.systems.engine import load_engine_tables
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
 from rtsim.systems.settings import load_drive_tables, load_flap_tables
 from rtsim.units import to_deg, to_kt
@@ -215,6 +216,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         pilot=pilot,
         flaps=load_flap_tables(profile),
         drive=load_drive_tables(profile, governed_speed=database.governed_speed),
+        engine=load_engine_tables(profile, density=own.configuration.density),
         aids=design_aids(database),
         gusts=gust_tables(setup.air, profile),
         faults=fault_tables(setup.faults, profile),
@@ -327,6 +329,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
         drive=np.zeros(DRIVE_STATE_SIZE),
+        tank=_tank(options.fuel, parts.tables.engine.capacity),
         gusts=new_gust_state(setup.air, air_normals),
         faults=new_fault_state(),
         protection=np.zeros(LAW.size),
@@ -341,6 +344,17 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     if options.aids:
         state.aids[MEMORY.last_switches] = -1.0  # engaged in the first frame, from the trim
     return state
+
+
+def _tank(fuel: float, capacity: float) -> FloatArray:
+    """The tanks at the start."""
+    if fuel == FULL_TANKS or capacity <= 0.0:
+        fuel = capacity
+    if fuel > capacity:
+        item = declared()["fuel"]
+        allowed = f"{item.low:g} to {item.shown(capacity):.9g} lb"
+        raise InputError("is more than the tanks hold", key=item.flag, value=item.shown(fuel), allowed=allowed)
+    return np.array([fuel, capacity])
 
 
 def prepare(
