@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rtsim.analysis.performance import Reached
     from rtsim.faults.fault import EngineRating
 
-# Nacelle angle [deg], airspeeds in which the fastest climb is looked for, one from which level flight speeds up [kn].
+# Nacelle angle [deg], airspeeds in which the fastest climb is looked for, and one to speed up from [kn].
 _SEARCHED = ((90.0, range(20, 101, 10), 40.0), (75.0, range(30, 131, 10), 80.0), (0.0, range(90, 201, 10), 170.0))
 _WORDS = {
     "power": "the engines give no more",

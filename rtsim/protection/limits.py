@@ -79,8 +79,8 @@ def _rotor(data: Part, *, engines: float) -> RotorTables:
         transmission = engines * data.number("helicopter_transmission_shp", low=1.0, high=1e5) * HORSEPOWER
     if data.has("rotor_endurance"):
         part = data.table("rotor_endurance")
-        angles = part.numbers("nacelle_deg", low=0.0, high=95.0, rises=True)
-        ratios = part.numbers("advance_ratio", low=0.0, high=2.0, rises=True)
+        angles = part.numbers("nacelle_deg", low=0.0, high=95.0, least=2, rises=True)
+        ratios = part.numbers("advance_ratio", low=0.0, high=2.0, least=2, rises=True)
         keys = [f"nacelle_{angle:g}" for angle in angles]
         limits = [part.numbers(key, low=1e-4, high=1.0, count=len(ratios)) for key in keys]
     return RotorTables(

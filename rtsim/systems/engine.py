@@ -136,8 +136,8 @@ def _flow(fuel: Part | None) -> Surfaces:
     if fuel is None:
         grid = np.array([0.0, 1.0])
         return stack_surfaces([np.zeros((2, 2, 4))], grid, grid)
-    altitude = np.asarray(fuel.numbers("altitude_ft", low=-4000.0, high=36000.0, rises=True))
-    printed = np.asarray(fuel.numbers("shaft_shp", low=0.0, high=1e5, rises=True))
+    altitude = np.asarray(fuel.numbers("altitude_ft", low=-4000.0, high=36000.0, least=2, rises=True))
+    printed = np.asarray(fuel.numbers("shaft_shp", low=0.0, high=1e5, least=2, rises=True))
     slope = fuel.number("slope_lb_h_shp", low=0.0, high=10.0)
     step = printed[1] - printed[0]
     power = np.arange(0.0, 2.0 * printed[-1] + 0.5 * step, step)
@@ -148,10 +148,10 @@ def _flow(fuel: Part | None) -> Surfaces:
         row = np.interp(power, known, values)
         row += slope * (np.minimum(power - known[0], 0.0) + np.maximum(power - known[-1], 0.0))
         rows.append(row)
-    x_grid, y_grid = power * HORSEPOWER, altitude * FOOT
-    nodes = smooth_surface(
-        x_grid.tolist(), y_grid.tolist(), np.array(rows).T * POUND_FORCE / _HOUR, x_grid=x_grid, y_grid=y_grid
-    )
+    x_grid, heights = power * HORSEPOWER, altitude * FOOT
+    y_grid = np.linspace(heights[0], heights[-1], len(heights))
+    flow = np.array(rows).T * POUND_FORCE / _HOUR
+    nodes = smooth_surface(x_grid.tolist(), heights.tolist(), flow, x_grid=x_grid, y_grid=y_grid)
     return stack_surfaces([nodes], x_grid, y_grid)
 
 

@@ -123,3 +123,16 @@ def test_the_profile_joins_the_files_of_a_part():
     assert systems.table("fuel").number("capacity_lb") == 1490.0
     assert systems.table("engine").number("takeoff_shp") == 1550.0
     assert {"GTRS", "FAMILIARIZATION", "DESIGN"} <= set(systems.table("sources").data)
+
+
+@pytest.mark.parametrize(("table", "key"), [
+    ("[systems.fuel]\ncapacity_lb = 100.0\naltitude_ft = [0.0]\n", "altitude_ft"),
+    ("[systems.engine.lapse]\naltitude_ft = [0.0, 1.0]\ntakeoff_shaft_shp = [1.0]\n", "takeoff_shaft_shp"),
+    ("[dimensions]\nrotor_solidity = 0.1\n", "rotor_radius_ft"),
+])  # fmt: skip
+def test_a_profile_that_says_half_of_it_is_refused_by_its_key(table, key, tmp_path):
+    text = 'name = "other"\nborrows = ["nacelle", "corridor", "protection", "controls", "pilot", "aids"]\n'
+    text += "" if "dimensions" in table else "[dimensions]\n"
+    text += "[systems.engine]\nengines = 2\ntakeoff_shp = 100.0\ntransmission_efficiency = 0.9\n"
+    with pytest.raises(InputError, match=key):
+        load_engine_tables(parse_profile(text + table, file=str(tmp_path / "own.profile.toml")))
