@@ -42,6 +42,7 @@ UNITS: dict[str, Unit] = {
     "lb": Unit("_lb", POUND_FORCE),
     "shp": Unit("_shp", HORSEPOWER),
     "in lb": Unit("_inlb", INCH_POUND),
+    "lb/h": Unit("_lb_h", POUND_FORCE / 3600.0),
     "rpm": Unit("_rpm", RPM),
 }
 """Units of signals, as shown on axes."""
@@ -160,6 +161,16 @@ SIGNALS: tuple[Signal, ...] = (
         "protection",
         "Predicted time until the corridor is left with the controls as they are; 6 where not, or unwatched.",
     ),
+    Signal("fuel_lb", "lb", "fuel", "Fuel left; what is burned does not make the aircraft lighter."),
+    Signal("fuel_flow_lb_h", "lb/h", "fuel", "Fuel that all engines burn."),
+    Signal(
+        "engine_power_available_shp",
+        "shp",
+        "power",
+        "Engine power at take-off rating at this altitude, or what a failure leaves.",
+    ),
+    Signal("thrust_coefficient_over_solidity", "", "rotor", "CT/sigma of one rotor: its load, rotor convention."),
+    Signal("advance_ratio", "", "rotor", "Speed of the air across the rotor disc over tip speed."),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

@@ -6,7 +6,9 @@ import math
 
 from rtsim.units import GRAVITY
 
-_TEMPERATURE, _PRESSURE, _LAPSE, _GAS = 288.15, 101325.0, 0.0065, 287.05287
+STANDARD_TEMPERATURE, TEMPERATURE_LAPSE = 288.15, 0.0065
+"""Temperature at sea level [K], and what it falls by with altitude [K/m]."""
+_PRESSURE, _GAS = 101325.0, 287.05287
 
 
 def standard_atmosphere(height: float) -> tuple[float, float]:
@@ -15,6 +17,6 @@ def standard_atmosphere(height: float) -> tuple[float, float]:
     Args:
         height: Pressure altitude [m], -1000 to 11000.
     """
-    temperature = _TEMPERATURE - _LAPSE * height
-    pressure = _PRESSURE * (temperature / _TEMPERATURE) ** (GRAVITY / (_LAPSE * _GAS))
+    temperature = STANDARD_TEMPERATURE - TEMPERATURE_LAPSE * height
+    pressure = _PRESSURE * (temperature / STANDARD_TEMPERATURE) ** (GRAVITY / (TEMPERATURE_LAPSE * _GAS))
     return pressure / (_GAS * temperature), math.sqrt(1.4 * _GAS * temperature)

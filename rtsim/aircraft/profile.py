@@ -76,22 +76,31 @@ class Part:
         return self._checked(key, self._value(key), low, high)
 
     def numbers(
-        self, key: str, *, low: float = -math.inf, high: float = math.inf, count: int | None = None, rises: bool = False
+        self,
+        key: str,
+        *,
+        low: float = -math.inf,
+        high: float = math.inf,
+        count: int | None = None,
+        least: int = 1,
+        rises: bool = False,
     ) -> list[float]:
         """A list of numbers within a range.
 
         Args:
             low: Smallest value allowed.
             high: Largest value allowed.
-            count: How many there must be; None: any number but none.
+            count: How many there must be; None: ``least`` or more.
+            least: How many there must be at least.
             rises: Whether each must be larger than the one before.
 
         Raises:
             InputError: It is missing, no such list, or one of them is out of range.
         """
         value = self._value(key)
-        if not isinstance(value, list) or not value or (count is not None and len(value) != count):
-            words = "a list of numbers" if count is None else f"a list of {count} numbers"
+        if not isinstance(value, list) or len(value) < least or (count is not None and len(value) != count):
+            number = f"{count} " if count is not None else f"at least {least} " if least > 1 else ""
+            words = f"a list of {number}numbers"
             raise self._refusal(f"is not {words}", key, value, words)
         found = [self._checked(f"{key}[{place}]", item, low, high) for place, item in enumerate(value)]
         if rises and any(after <= before for before, after in itertools.pairwise(found)):
@@ -190,9 +199,15 @@ def _xv15_profile() -> AircraftProfile:
     document = shipped_toml(XV15_DATA, "profile.toml")
     parts: dict[str, Any] = {}
     for part in PARTS:
-        named = isinstance(document[part], str)
-        file = document[part] if named else "profile.toml"
-        parts[part] = Part(part, f"xv15/data/{file}", shipped_toml(XV15_DATA, file) if named else document[part])
+        given = document[part]
+        files = [given] if isinstance(given, str) else given if isinstance(given, list) else []
+        data: dict[str, Any] = {} if files else given
+        sources: dict[str, str] = {}
+        for file in files:
+            content = shipped_toml(XV15_DATA, file)
+            sources |= content.get("sources", {})
+            data = data | content | ({"sources": sources} if sources else {})
+        parts[part] = Part(part, f"xv15/data/{', '.join(files) or 'profile.toml'}", data)
     return AircraftProfile(name=document["name"], file="xv15/data/profile.toml", **parts)
 
 

@@ -235,9 +235,13 @@ def profile_problems(database: Database) -> list[InputError]:
     from rtsim.pilot.weights import pilot_settings
     from rtsim.protection.limits import load_levels
     from rtsim.protection.tables import law_tables
+    from rtsim.systems.engine import load_engine_tables
     from rtsim.systems.settings import load_drive_tables, load_flap_tables
 
-    of_profile = (control_tables, load_nacelle_tables, load_levels, load_flap_tables, load_drive_tables, pilot_settings)
+    of_profile = (
+        control_tables, load_nacelle_tables, load_levels, load_flap_tables, load_drive_tables, load_engine_tables,
+        pilot_settings,
+    )  # fmt: skip
     profile = database.profile
     reads: list[Callable[[], object]] = [functools.partial(read, profile) for read in of_profile]
     reads += [functools.partial(load_corridor, name, profile) for name in get_args(ChartName)]

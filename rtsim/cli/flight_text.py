@@ -24,6 +24,8 @@ STATUS_PERIOD_S = 0.25
 MAX_EVENT_LINES = 40
 """Events told while flying; a flight along a boundary has more than anyone reads."""
 _CONTROLS = (("stick", "stick_s"), ("lever", "lever_s"), ("nacelles", "nacelles_s"))
+_CORRIDOR_LIMITS = {"stall_attitude", "load_torque", "downstop_gate", "consistency", "time_to_limit"}
+"""What the line of the corridor says."""
 _STYLES = {"caution": "yellow", "warning": "bold yellow", "exceedance": "bold red"}
 
 
@@ -225,15 +227,30 @@ def _print_metrics(summary: dict[str, Any]) -> None:
         ("Pitch", f"{pitch['min']:.1f} to {pitch['max']:.1f} deg", ""),
         ("Stick", f"travel {stick['travel_in']:.2f} in", f"rate {stick['rms_rate_in_s']:.2f} in/s rms"),
         ("Lever", f"travel {lever['travel']:.3f}", f"rate {lever['rms_rate_per_s']:.3f} 1/s rms; {on_stop}"),
+        ("Fuel", f"{summary['fuel_lb']['used']:.1f} lb used", ""),
         ("Corridor", f"worst margin {corridor['worst_margin_kt']:.1f} kn", outside),
     )
     for name, result, details in rows:
         say(f"{name:9} {result:25} {details}".rstrip())
+    _print_limits(summary.get("limits", {}))
     acted = summary.get("interventions", {})
     if acted.get("episodes"):
         times = "acted" if acted["episodes"] == 1 else f"acted {acted['episodes']} times"
         on = [f"{name} {acted[key]:.1f} s" for name, key in _CONTROLS if acted[key]]
         say(f"Protection {times}: {', '.join(on)}")
+
+
+def _print_limits(limits: Mapping[str, Mapping[str, Any]]) -> None:
+    """Say which limits besides the corridor were passed, for how long and how far."""
+    from rtsim.protection.monitor_kernels import LIMIT_WORDS
+
+    passed = []
+    for name, found in limits.items():
+        if found["outside_s"] and name not in _CORRIDOR_LIMITS:
+            beyond = f"{-found['worst_margin']:.1f} {found['unit']}".rstrip()
+            passed.append(f"{LIMIT_WORDS[name]} for {found['outside_s']:.1f} s (by {beyond})")
+    if passed:
+        say(f"Limits passed: {'; '.join(passed)}", style="yellow")
 
 
 def _measured(verdict: Verdict) -> str:

@@ -30,6 +30,7 @@ COMMAND_MODULES = (
     "replay",
     "analysis",
     "rotor",
+    "performance",
     "corridor",
     "pilot",
     "model",

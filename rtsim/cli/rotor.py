@@ -24,6 +24,13 @@ def rotor_command(
     shaft_deg: Annotated[
         float, typer.Option(help="Tilt of the shaft from normal to the flow [deg], positive aft; -90: a propeller.")
     ] = 0.0,
+    stall_delay: Annotated[
+        str | None,
+        typer.Option(
+            help="How rotation keeps the inner sections from stalling: corrigan_schillings, du_selig or none.",
+            show_default="the aircraft's, corrigan_schillings",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Solve one rotor alone, without the other rotor and the wing, in sea-level standard air.
@@ -38,7 +45,11 @@ def rotor_command(
     _check("--advance-ratio", advance_ratio, 0.0, 1.5)
     _check("--shaft-deg", shaft_deg, -90.0, 90.0)
     condition = RotorCondition(tip_mach=tip_mach, advance_ratio=advance_ratio, shaft_angle=deg(shaft_deg))
-    answer = rotor_answer(IsolatedRotor.load(), thrust_coefficient, condition)
+    answer = rotor_answer(
+        IsolatedRotor.load({} if stall_delay is None else {"rotor.stall_delay": stall_delay}),
+        thrust_coefficient,
+        condition,
+    )
     if json:
         emit_json(answer)
     if not answer["converged"]:

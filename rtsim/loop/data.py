@@ -18,6 +18,7 @@ from rtsim.pilot.pilot_kernels import PilotTables
 from rtsim.places import Places
 from rtsim.protection.law_data import ProtectionTables
 from rtsim.systems.drive_kernels import DriveTables
+from rtsim.systems.engine_kernels import EngineTables
 from rtsim.systems.flap_kernels import FlapTables
 
 MODE = Places("mocm", "external", "hold")
@@ -49,9 +50,9 @@ PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
 """Rows of the programme."""
 MOTION = Places("angle", "rate", "acceleration")
 """The nacelles now [rad, rad/s, rad/s^2]."""
-KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air")
+KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air", "place")
 """Flap deflection of the schedule [rad]; airspeed of the programme at the end of the frame, and of the aircraft at its
-start, gusts excepted [m/s]."""
+start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""
@@ -111,6 +112,8 @@ class SimulationTables(NamedTuple):
     """What moves the flaps."""
     drive: DriveTables
     """What turns the rotors."""
+    engine: EngineTables
+    """Power that the engines have, fuel that they burn."""
     aids: AidTables
     """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
     bare aircraft, nor on controls that are held."""
@@ -154,8 +157,9 @@ class SimulationState(NamedTuple):
     flaps: FloatArray
     """Deflection of the flaps, whether they follow their schedule, and their setting."""
     drive: FloatArray
-    """Rotor speed less the governed one, engine power, its offset from the throttle's law, whether governed, throttle
-    trim."""
+    """State of the rotor drive, see ``rtsim.systems.drive_kernels``."""
+    tank: FloatArray
+    """Fuel left and what the tanks hold, ``TANK``."""
     gusts: FloatArray
     """Turbulence filters, gusts that act or are to come, and what acts now."""
     faults: FloatArray

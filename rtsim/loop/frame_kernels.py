@@ -23,6 +23,7 @@ from rtsim.kernels.parts import call_at
 from rtsim.loop.advance_kernels import (
     aid,
     ask,
+    burn_fuel,
     disturb,
     fail,
     faults_act,
@@ -76,6 +77,7 @@ def advance(flight: Flight, stages: int, pilot_normals: FloatArray, air_normals:
         move_plant(flight)
         move_reference(flight)
         disturb(flight, flight.tables.dt, air_normals)
+        burn_fuel(flight)
         judge_end(flight)
         if flight.parts[PART.notice] != 0:
             call_at(flight.parts[PART.notice], flight)

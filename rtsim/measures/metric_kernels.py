@@ -167,6 +167,8 @@ METRICS = (
     Metric("engine_power_max_shp", "shp", "largest engine power", lambda s: s.power_largest, (SEARCH,)),
     Metric("energy_mj", "MJ", "energy of the engines", lambda s: s.power * s.dt * HORSEPOWER / 1e6, (SEARCH,),
            objective="energy"),
+    Metric("fuel_used_lb", "lb", "fuel burned", lambda s: s.fuel_flow * s.dt / 3600.0, (FLIGHT, SEARCH),
+           flight="fuel_lb.used"),
     Metric("load_factor_max", "", "largest load factor", lambda s: s.load_largest, (TRIAL,)),
     Metric("load_factor_min", "", "smallest load factor", lambda s: s.load_least, (TRIAL,)),
     Metric("load_factor_beyond", "", "largest load factor beyond its limits, negative inside",
@@ -218,7 +220,7 @@ SUM = Places(
     "airspeed_squares", "airspeed_error", "airspeed", "nacelle", "nacelle_error", "nacelle_rate",
     "altitude", "height_lost", "height_gained", "pitch_least", "pitch_largest", "pitch_rate_squares",
     ("stick", CONTROL.size), ("lever", CONTROL.size), "stop_frames",
-    "torque_share", "torque_over", "torque", "power", "power_largest", "load_largest", "load_least",
+    "torque_share", "torque_over", "torque", "power", "power_largest", "fuel_flow", "load_largest", "load_least",
     "unacted", "activations", "corridor_active", "other_active", "nacelle_removed",
     "share_stick", "share_stick_squares", "share_stick_step", "share_lever", "share_lever_squares", "share_lever_step",
     "arrival", "conversion", "goal_airspeed", "goal_way",
@@ -374,6 +376,7 @@ def _load_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> Non
         sums[SUM.torque_over] += dt
     sums[SUM.torque] = max(sums[SUM.torque], torque)
     sums[SUM.power] += power
+    sums[SUM.fuel_flow] += row[COLUMN.fuel_flow_lb_h]
     sums[SUM.power_largest] = max(sums[SUM.power_largest], power)
     sums[SUM.load_largest] = max(sums[SUM.load_largest], load)
     sums[SUM.load_least] = min(sums[SUM.load_least], load)

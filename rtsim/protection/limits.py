@@ -14,11 +14,13 @@ from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
-from rtsim.protection.monitor_kernels import LIMIT_NUMBERS, LIMIT_WORDS
-from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt
+from rtsim.protection.monitor_kernels import LIMIT_NUMBERS, LIMIT_WORDS, RotorTables
+from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, deg, kt
 
 LIMIT_KINDS = tuple(name for name in LIMIT_WORDS if name != "time_to_limit")
 """Limits by name; the number of a limit is its place here, and a recorded reason is that number plus one."""
+OPTIONAL = ("engine_power", "transmission", "rotor_endurance")
+"""Limits that an aircraft's data need not name; they are not watched then."""
 _SI = {"_deg_s": DEGREE, "_deg": DEGREE}
 """SI value of one unit of a limit, by how its key ends; 1 for others."""
 
@@ -30,6 +32,8 @@ class Limits(SimpleNamespace):
     """Mast torque."""
     sink: SinkTables
     """Sink rate."""
+    rotor: RotorTables
+    """Transmission and rotor endurance."""
     plant_guard: float
     """Distance a law's low side keeps from where the plant's unstalled trims end [m/s]."""
 
@@ -42,7 +46,9 @@ def load_limits(profile: AircraftProfile | None = None) -> Limits:
         InputError: A value is missing or out of range.
     """
     data = _part(profile).table("limits")
+    engines = (xv15_profile() if profile is None else profile).systems.table("engine")
     return Limits(
+        rotor=_rotor(data, engines=engines.number("engines", low=1, high=8)),
         torque=TorqueTables(
             cruise=data.number("mast_torque_inlb", low=1.0, high=1e9) * INCH_POUND,
             takeoff=data.number("mast_torque_takeoff_inlb", low=1.0, high=1e9) * INCH_POUND,
@@ -63,8 +69,34 @@ def load_limits(profile: AircraftProfile | None = None) -> Limits:
     )
 
 
+def _rotor(data: Part, *, engines: float) -> RotorTables:
+    """What transmission and rotors bear, where the data say."""
+    transmission = math.inf
+    angles: list[float] = []
+    ratios: list[float] = [0.0]
+    limits: list[list[float]] = []
+    if data.has("helicopter_transmission_shp"):
+        transmission = engines * data.number("helicopter_transmission_shp", low=1.0, high=1e5) * HORSEPOWER
+    if data.has("rotor_endurance"):
+        part = data.table("rotor_endurance")
+        angles = part.numbers("nacelle_deg", low=0.0, high=95.0, least=2, rises=True)
+        ratios = part.numbers("advance_ratio", low=0.0, high=2.0, least=2, rises=True)
+        keys = [f"nacelle_{angle:g}" for angle in angles]
+        limits = [part.numbers(key, low=1e-4, high=1.0, count=len(ratios)) for key in keys]
+    return RotorTables(
+        transmission=transmission,
+        helicopter=deg(data.number("takeoff_nacelle_above_deg", low=0.0, high=95.0)),
+        nacelle=np.radians(angles),
+        advance_ratio=np.array(ratios),
+        endurance=np.array(limits).reshape(len(angles), len(ratios)),
+    )
+
+
 UNIT_SCALE = {"kn": KNOT, "deg": DEGREE, "deg/s": DEGREE, "%": 0.01, "": 1.0, "m/s": 1.0, "s": 1.0}
 """SI value of one unit of the levels' data."""
+TOLD_FROM = 2.0
+"""Lowest level that is told of a limit that has all three: a caution of the torque, say, belongs to every climb."""
+_LEVELS = 3
 WATCHED = tuple(LIMIT_WORDS)
 """What has a margin and a level, in the order of the arrays."""
 
@@ -78,7 +110,11 @@ class LimitLevels:
     scale: FloatArray
     """SI value of that unit."""
     threshold: FloatArray
-    """Margins below which caution, warning and exceedance begin, shape (limits, 3)."""
+    """Margins below which caution, warning and exceedance begin, shape (limits, 3); minus infinity: they never do."""
+    outside: FloatArray
+    """Margins below which a limit is passed: where its last level begins."""
+    told_from: FloatArray
+    """Lowest level that people are told of, by number."""
     hysteresis: FloatArray
     """How far above its threshold a margin must rise before the level ends."""
     rise: float
@@ -95,20 +131,30 @@ def load_levels(profile: AircraftProfile | None = None) -> LimitLevels:
         InputError: A value is missing or out of range.
     """
     data = _part(profile).table("levels")
-    parts = [data.table(name) for name in WATCHED]
-    units = tuple(part.text("unit") for part in parts)
-    for part, unit in zip(parts, units, strict=True):
-        if unit not in UNIT_SCALE:
-            raise InputError(
-                "is not a unit", file=part.file, key=f"{part.name}.unit", value=unit, allowed=", ".join(UNIT_SCALE)
-            )
-    scale = [UNIT_SCALE[unit] for unit in units]
-    rows = [part.numbers("threshold", low=-1e6, high=1e6, count=3) for part in parts]
+    units, rows, hysteresis = [], [], []
+    for name in WATCHED:
+        unit, row, back = "", [-math.inf], 0.0
+        if data.has(name) or name not in OPTIONAL:
+            part = data.table(name)
+            unit, row = part.text("unit"), part.numbers("threshold", low=-1e6, high=1e6)
+            back = part.number("hysteresis", low=0.0, high=1e6)
+            if unit not in UNIT_SCALE:
+                allowed = ", ".join(UNIT_SCALE)
+                raise InputError("is not a unit", file=part.file, key=f"{part.name}.unit", value=unit, allowed=allowed)
+            if len(row) not in (1, _LEVELS):
+                allowed = f"one margin for a caution, or {_LEVELS}"
+                key = f"{part.name}.threshold"
+                raise InputError("has the wrong length", file=part.file, key=key, value=row, allowed=allowed)
+        units.append(unit)
+        rows.append([UNIT_SCALE[unit] * margin for margin in row])
+        hysteresis.append(UNIT_SCALE[unit] * back)
     return LimitLevels(
-        units=units,
-        scale=np.array(scale),
-        threshold=np.array([[s * value for value in row] for row, s in zip(rows, scale, strict=True)]),
-        hysteresis=np.array([s * p.number("hysteresis", low=0.0, high=1e6) for p, s in zip(parts, scale, strict=True)]),
+        units=tuple(units),
+        scale=np.array([UNIT_SCALE[unit] for unit in units]),
+        threshold=np.array([row + [-math.inf] * (_LEVELS - len(row)) for row in rows]),
+        outside=np.array([row[-1] for row in rows]),
+        told_from=np.array([1.0 if len(row) == 1 else TOLD_FROM for row in rows]),
+        hysteresis=np.array(hysteresis),
         rise=data.number("rise_s", low=0.0, high=60.0),
         fall=data.number("fall_s", low=0.0, high=60.0),
     )

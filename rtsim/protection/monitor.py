@@ -18,12 +18,13 @@ from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data, law_kernels, monitor_kernels
 from rtsim.protection.boundary import load_boundary, model_corridor
 from rtsim.protection.limits import WATCHED, LimitLevels, load_levels, load_limits
-from rtsim.protection.monitor_kernels import FAR, KIND, LIMIT, MonitorTables
+from rtsim.protection.monitor_kernels import DRIVEN, FAR, KIND, LIMIT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
 from rtsim.units import DEGREE
 
 SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
 """Quantities of the frame that sensors show under another name."""
+_DRIVEN = np.array([QUANTITY.asdict()[name] for name in DRIVEN.asdict()])
 _SENSED = np.array([QUANTITY.asdict()[SHOWN_AS.get(name, name)] for name in Sensors.__slots__ if name != "nacelle_ok"])
 
 
@@ -94,17 +95,22 @@ class MarginWatch:
         """A new flight begins: all levels are clear."""
         self._state[:] = 0.0
 
-    def look(self, sensors: FloatArray, ahead: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def look(
+        self, sensors: FloatArray, ahead: FloatArray, driven: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Margins and levels of the next rows, each of shape (frames, KIND.size).
 
         Args:
             sensors: What is known (frames, SENSOR.size).
             ahead: Time to limit (frames,) [s].
+            driven: What the frame knows besides, ``driven_of_rows``; None: nothing, and its limits are not watched.
         """
+        if driven is None:
+            driven = np.full((len(sensors), DRIVEN.size), np.nan)
         margins, levels = np.empty((len(sensors), KIND.size)), np.empty((len(sensors), KIND.size))
-        monitor_kernels.watch(self._tables, sensors, ahead, self._dt, self._state, margins, levels)
+        monitor_kernels.watch(self._tables, sensors, driven, ahead, self._dt, self._state, margins, levels)
         self._worst = np.minimum(self._worst, margins.min(axis=0, initial=np.inf))
-        self._outside += np.count_nonzero(margins < self.limits.threshold[:, 2], axis=0)
+        self._outside += np.count_nonzero(margins < self.limits.outside, axis=0)
         return margins, levels
 
     def summary(self) -> dict[str, dict[str, Any]]:
@@ -188,7 +194,7 @@ class MarginMonitor:
         monitor_kernels.predict(self._law, sensors, acting, ahead, side)
         monitor_kernels.distances(self.tables, sensors, distance)
         watch = MarginWatch(self.tables, self._limits, self.dt)
-        time, (margins, levels) = rows[:, COLUMN.time_s].copy(), watch.look(sensors, ahead)
+        time, (margins, levels) = rows[:, COLUMN.time_s].copy(), watch.look(sensors, ahead, driven_of_rows(rows))
         return MarginHistory(time, margins, levels, distance, ahead, side, watch.summary())
 
 
@@ -210,6 +216,7 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         plant=sample_boundary(model_corridor(database, limits)),
         torque=limits.torque,
         sink=limits.sink,
+        rotor=limits.rotor,
         numbers=np.array([getattr(limits, name) for name in LIMIT.asdict()]),
         threshold=levels.threshold,
         hysteresis=levels.hysteresis,
@@ -233,3 +240,9 @@ def sensors_of_rows(rows: FloatArray) -> FloatArray:
     sensors = np.empty((len(rows), SENSOR.size))
     monitor_kernels.sensors_of(np.ascontiguousarray(rows), _SENSED, UNIT_SCALES[_SENSED], sensors)
     return sensors
+
+
+def driven_of_rows(rows: FloatArray) -> FloatArray:
+    """What the rows say of engines and rotors besides the sensors, SI, shape (frames, DRIVEN.size)."""
+    driven: FloatArray = np.ascontiguousarray(rows[:, _DRIVEN] * UNIT_SCALES[_DRIVEN])
+    return driven

@@ -31,6 +31,9 @@ LIMIT_WORDS = {
     "pitch_attitude": "pitch attitude",
     "consistency": "aircraft's own trims",
     "sink": "sink rate",
+    "engine_power": "engine power",
+    "transmission": "helicopter transmission",
+    "rotor_endurance": "rotor endurance",
     "time_to_limit": "time to the corridor's boundary",
 }
 """Limits in words for people, in the order of the recorded reasons (a reason is a limit's place plus one), and last the
@@ -53,6 +56,23 @@ LIMIT = Places(*LIMIT_NUMBERS)
 LEVEL_STATE_SIZE = KIND.size * 6
 FAR = 1e3
 """A margin where the limit does not apply."""
+DRIVEN = Places("engine_power", "engine_power_available", "power", "thrust_coefficient_over_solidity", "advance_ratio")
+"""What the frame knows of engines and rotors besides the sensors, SI; NaN where only the sensors are known."""
+
+
+class RotorTables(NamedTuple):
+    """What rotors and transmission bear for long. SI and radians."""
+
+    transmission: float
+    """Rotor shaft power of all engines that the transmission bears in helicopter mode [W]; infinite: any."""
+    helicopter: float
+    """Nacelle angle above which that holds [rad]."""
+    nacelle: FloatArray
+    """Nacelle angles of the endurance limit, ascending, held beyond both ends [rad]; none: no limit is known."""
+    advance_ratio: FloatArray
+    """Its advance ratios, ascending from 0, the last held beyond."""
+    endurance: FloatArray
+    """Largest CT/sigma for endurance, shape (nacelle angles, advance ratios)."""
 
 
 class MonitorTables(NamedTuple):
@@ -68,6 +88,8 @@ class MonitorTables(NamedTuple):
     """Mast torque."""
     sink: SinkTables
     """Sink rate."""
+    rotor: RotorTables
+    """Transmission and rotor endurance."""
     numbers: FloatArray
     """Limits that are numbers, places ``LIMIT``."""
     threshold: FloatArray
@@ -81,13 +103,58 @@ class MonitorTables(NamedTuple):
 
 
 @inner_kernel
-def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: float, out: FloatArray) -> None:
+def _segment(nodes: FloatArray, value: float) -> tuple[int, float]:
+    """Where a value lies between ascending nodes: number of the node before it and share of the way, ends held."""
+    last, k = nodes.shape[0] - 1, 0
+    while k < last - 1 and nodes[k + 1] <= value:
+        k += 1
+    return k, min(max((value - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+
+
+@inner_kernel
+def endurance_limit(tables: RotorTables, advance_ratio: float, nacelle: float) -> float:
+    """Largest CT/sigma that rotors bear for long [-], linear between the published points.
+
+    Args:
+        tables: The limit, with points.
+        advance_ratio: Speed of the air across the disc over tip speed.
+        nacelle: Nacelle angle [rad].
+    """
+    i, s = _segment(tables.nacelle, nacelle)
+    j, t = _segment(tables.advance_ratio, advance_ratio)
+    z = tables.endurance
+    near = z[i, j] + t * (z[i, j + 1] - z[i, j])
+    return near + s * (z[i + 1, j] + t * (z[i + 1, j + 1] - z[i + 1, j]) - near)
+
+
+@inner_kernel
+def _rotor_margins(tables: RotorTables, driven: FloatArray, angle: float, out: FloatArray) -> None:
+    """Margins of engines, transmission and rotors; ``FAR`` where nothing is known of them."""
+    out[KIND.engine_power] = out[KIND.transmission] = out[KIND.rotor_endurance] = FAR
+    available = driven[DRIVEN.engine_power_available]
+    if available > 0.0:
+        out[KIND.engine_power] = 1.0 - driven[DRIVEN.engine_power] / available
+    power = driven[DRIVEN.power]
+    if angle > tables.helicopter and math.isfinite(tables.transmission) and not math.isnan(power):
+        out[KIND.transmission] = 1.0 - power / tables.transmission
+    load = driven[DRIVEN.thrust_coefficient_over_solidity]
+    if tables.nacelle.shape[0] > 0 and not math.isnan(load) and load != 0.0:
+        limit = endurance_limit(tables, driven[DRIVEN.advance_ratio], angle)
+        out[KIND.rotor_endurance] = 1.0 - abs(load) / limit
+
+
+@inner_kernel
+def limit_margins(
+    tables: MonitorTables, sensors: FloatArray, driven: FloatArray, time_to_limit: float, out: FloatArray
+) -> None:
     """Signed distance to every limit, positive inside.
 
     Args:
         sensors: What is known, order of ``rtsim.command.Sensors``.
+        driven: What is known besides, places ``DRIVEN``.
         time_to_limit: Predicted time to the corridor's boundary [s].
-        out: Written, shape (KIND.size,): m/s for speeds, rad and rad/s for angles, share of the limit for torque.
+        out: Written, shape (KIND.size,): m/s for speeds, rad and rad/s for angles, share of the limit for torque, power
+            and rotor load.
     """
     airspeed, angle, numbers = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], tables.numbers
     low, high = speed_range(tables.chart, angle)
@@ -105,6 +172,7 @@ def limit_margins(tables: MonitorTables, sensors: FloatArray, time_to_limit: flo
     low, high = speed_range(tables.plant, angle)
     out[KIND.consistency] = min(airspeed - low, high - airspeed)
     out[KIND.sink] = allowed_sink(tables.sink, airspeed, sensors[SENSOR.altitude]) + sensors[SENSOR.climb_rate]
+    _rotor_margins(tables.rotor, driven, angle, out)
     out[KIND.time_to_limit] = time_to_limit
 
 
@@ -179,6 +247,7 @@ def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) ->
 def watch(
     tables: MonitorTables,
     sensors: FloatArray,
+    driven: FloatArray,
     time_to_limit: FloatArray,
     dt: float,
     state: FloatArray,
@@ -189,13 +258,14 @@ def watch(
 
     Args:
         sensors: One row per frame, shape (frames, SENSOR.size).
+        driven: The same of what is known besides, shape (frames, DRIVEN.size).
         time_to_limit: One per frame (frames,) [s].
         state: Of the levels, updated in place, zeros at the start of a flight (LEVEL_STATE_SIZE,).
         margins: Written (frames, KIND.size).
         levels: Written (frames, KIND.size).
     """
     for k in range(sensors.shape[0]):
-        limit_margins(tables, sensors[k], time_to_limit[k], margins[k])
+        limit_margins(tables, sensors[k], driven[k], time_to_limit[k], margins[k])
         levels_step(tables, margins[k], dt, state, levels[k])
 
 

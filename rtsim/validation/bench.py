@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any, TypeVar
 
@@ -21,6 +21,7 @@ from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE, STATES
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.analysis.isolated_rotor import IsolatedRotor, RotorCondition, RotorPoint
+from rtsim.analysis.performance import climb_rate
 from rtsim.arrays import FloatArray
 from rtsim.units import (
     DEGREE,
@@ -42,8 +43,6 @@ ROOT_TWIST_DEG = 34.43
 STICK_HALF_TRAVEL_IN, STICK_NEUTRAL_IN = 4.8, 4.8
 TRANSMISSION = 0.93
 """Rotor shaft power over engine power (TM X-62407 sec. 5)."""
-TAIL_WITHOUT_WAKE = "validation.tail_without_wake"
-"""Change of our own: no rotor wake at the tail, as the charts of 1975 assume."""
 _SLOW = [STATE.u, STATE.w, STATE.q, STATE.pitch]
 _FAST = [i for i in range(len(STATES)) if i not in {*_SLOW, STATE.altitude}]
 Found = TypeVar("Found")
@@ -134,17 +133,10 @@ class Bench:
         """Take an aircraft.
 
         Args:
-            changes: As of ``Xv15.load``, and ``TAIL_WITHOUT_WAKE``.
+            changes: As of ``Xv15.load``.
         """
         self._changes = dict(changes or {})
-        own = dict(self._changes)
-        bare_tail = own.pop(TAIL_WITHOUT_WAKE, False)
-        aircraft = Xv15.load(own)
-        if bare_tail:
-            tail = aircraft.tables.tail
-            still = tail.rotor_wake._replace(nodes=np.zeros_like(tail.rotor_wake.nodes))
-            aircraft = Xv15(aircraft.tables._replace(tail=tail._replace(rotor_wake=still)))
-        self.aircraft = aircraft
+        self.aircraft = Xv15.load(self._changes)
         self._found: dict[Any, Any] = {}
 
     def once(self, key: object, find: Callable[[], Found]) -> Found:
@@ -162,7 +154,15 @@ class Bench:
     @property
     def without_tail_wake(self) -> Bench:
         """The same aircraft without rotor wake at the tail."""
-        return self.once("bare tail", lambda: Bench(self._changes | {TAIL_WITHOUT_WAKE: True}))
+        return self.changed({"tail.rotor_wake": False})
+
+    def changed(self, changes: Mapping[str, Any]) -> Bench:
+        """The same aircraft with further changes.
+
+        Args:
+            changes: As of ``Xv15.load``.
+        """
+        return self.once(tuple(changes.items()), lambda: Bench(self._changes | dict(changes)))
 
     def condition(
         self,
@@ -247,37 +247,13 @@ class Bench:
         return point.x, point.u
 
     def _grouped(self, airspeed_kt: float, state: tuple[FloatArray, FloatArray]) -> Mapping[str, FloatArray]:
-        """Pylons and spinners are what changes when their drag areas are taken away, wherever the model books them."""
-        body = self.aircraft.tables.body
-        flat = body.pylon_area._replace(
-            values=np.zeros_like(body.pylon_area.values), slopes=np.zeros_like(body.pylon_area.slopes)
-        )
-        whole = self._booked(self.aircraft, airspeed_kt, state)
-        without = {
-            "pylons": self._changed_body(pylon_area=flat),
-            "spinners": self._changed_body(spinner_area=0.0, spinner_incidence_area=0.0),
-        }
-        parts = {
-            name: sum(whole.values()) - sum(self._booked(aircraft, airspeed_kt, state).values())
-            for name, aircraft in without.items()
-        }
-        rotors_alone = self._booked(without["spinners"], airspeed_kt, state)["rotors"]
-        loads = {name: np.asarray(load) for name, load in (whole | parts).items()}
-        loads["rotor total"] = rotors_alone + loads["spinners"]
-        loads["airframe"] = np.asarray(sum(whole.values())) - loads["rotor total"]
-        return loads
-
-    def _changed_body(self, **values: Any) -> Xv15:
-        tables = self.aircraft.tables
-        return Xv15(tables._replace(body=tables.body._replace(**values)))
-
-    def _booked(
-        self, aircraft: Xv15, airspeed_kt: float, state: tuple[FloatArray, FloatArray]
-    ) -> dict[str, FloatArray]:
         condition = self.condition(airspeed_kt, 90.0)
         unit = np.array([POUND_FORCE, POUND_FORCE, FOOT_POUND])
-        loads = aircraft.at(condition).component_loads(*state, condition.nacelle_angle)
-        return {name: np.asarray(load / unit) for name, load in loads.items()}
+        found = self.aircraft.at(condition).component_loads(*state, condition.nacelle_angle)
+        loads = {name: np.asarray(load / unit) for name, load in found.items()}
+        loads["rotor total"] = loads["rotors"] + loads["spinners"]
+        loads["airframe"] = np.sum(list(found.values()), axis=0) / unit - loads["rotor total"]
+        return loads
 
     # -- lines of trims
 
@@ -341,38 +317,37 @@ class Bench:
     def climb(self, airspeed_kt: float, nacelle_deg: float, power_shp: float, **rest: Any) -> float:
         """Steady rate of climb at a shaft power of both rotors, descent negative [ft/min].
 
-        At mass m a steady climb at an angle has the air loads of a level acceleration of a mass m cos(angle).
-
         Args:
-            power_shp: Shaft power of both rotors [shp].
+            power_shp: Shaft power of both rotors [shp]; 0: autorotation.
             **rest: As of :meth:`condition`.
         """
-        level = self.condition(airspeed_kt, nacelle_deg, **rest)
-        mass = self.aircraft.tables.configuration.mass
-        point = self.point(level)
-        if not point.converged:
-            return math.nan
-        step = 0.01 if power_shp > self.shown(level, point).power_shp else -0.01
-        slope, power = 0.0, self.shown(level, point).power_shp
-        while abs(slope) < 0.7:
-            ahead = slope + step
-            condition = Condition(
-                airspeed=level.airspeed,
-                nacelle_angle=level.nacelle_angle,
-                flap=level.flap,
-                rotor_speed=level.rotor_speed,
-                acceleration=GRAVITY * math.tan(ahead),
-                mass=mass * math.cos(ahead),
-            )
-            point = self.aircraft.trim(condition, guess=point)
-            if not point.converged:
-                return math.nan
-            found = self.shown(condition, point).power_shp
-            if (found - power_shp) * (power - power_shp) <= 0.0:
-                share = (power_shp - power) / (found - power)
-                return float(airspeed_kt * kt(1.0) * math.sin(slope + share * step) / FOOT * 60.0)
-            slope, power = ahead, found
-        return math.nan
+        condition = self.condition(airspeed_kt, nacelle_deg, **rest)
+        # A watt for nothing: what there is, is compared with what is needed by division.
+        found = climb_rate(self.aircraft, condition, power=max(power_shp * HORSEPOWER, 1.0), torque=math.inf)
+        ended = found.point.y[OUTPUT.power] / HORSEPOWER if found.point is not None else math.nan
+        # Ended by anything else than the power asked for, there is no such climb.
+        return found.value / FOOT * 60.0 if abs(ended - power_shp) < 1.0 else math.nan
+
+    def least_power_in_descent(self, airspeed_kt: float, nacelle_deg: float, **rest: Any) -> tuple[float, float]:
+        """Least shaft power of both rotors [shp] over the angles of descent, and the sink there [ft/min].
+
+        Args:
+            **rest: As of :meth:`condition`.
+        """
+
+        def find() -> tuple[float, float]:
+            level = self.condition(airspeed_kt, nacelle_deg, **rest)
+            point, found = self.point(level), []
+            mass = self.aircraft.tables.configuration.mass
+            for angle in np.arange(0.01, 0.8, 0.01):
+                slope = replace(level, acceleration=-GRAVITY * math.tan(angle), mass=mass * math.cos(angle))
+                point = self.aircraft.trim(slope, guess=point)
+                if not point.converged:
+                    break
+                found.append((self.shown(slope, point).power_shp, level.airspeed * math.sin(angle) / FOOT * 60.0))
+            return min(found, default=(math.nan, math.nan))
+
+        return self.once(("descent", airspeed_kt, nacelle_deg, *rest.items()), find)
 
     # -- hover and linear models
 

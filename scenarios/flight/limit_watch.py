@@ -18,7 +18,7 @@ from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
-from rtsim.protection.monitor import MarginWatch, monitor_tables, sensors_of_rows
+from rtsim.protection.monitor import MarginWatch, driven_of_rows, monitor_tables, sensors_of_rows
 from rtsim.protection.monitor_kernels import KIND, LIMIT_WORDS, MonitorTables
 from telemetry.log.format import LogEvent
 
@@ -26,8 +26,6 @@ BATCH_ROWS = 10
 """Rows of a paced flight that are looked at together: one call of compiled code costs more than the rows."""
 LET_GO_S = 1.0
 """A law that has not acted for as long has let go [s]."""
-TOLD_FROM = 2
-"""Lowest level that is told: a caution of the torque, say, belongs to every climb."""
 _TOLD_ELSEWHERE = ("stall_attitude", "load_torque", "nacelle_range")
 _CHANNELS = (
     ("stick", COLUMN.protection_stick_reason),
@@ -110,8 +108,8 @@ class LimitWatch:
 
     def _watch_limits(self, rows: FloatArray) -> None:
         ahead = np.ascontiguousarray(rows[:, COLUMN.time_to_limit_s])
-        margins, levels = self._levels.look(sensors_of_rows(rows), ahead)
-        told = np.where(levels >= TOLD_FROM, levels, 0.0)
+        margins, levels = self._levels.look(sensors_of_rows(rows), ahead, driven_of_rows(rows))
+        told = np.where(levels >= self._levels.limits.told_from, levels, 0.0)
         if not told.any() and not self._told.any():
             return
         before = np.vstack([self._told, told[:-1]])

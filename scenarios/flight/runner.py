@@ -49,7 +49,9 @@ if TYPE_CHECKING:
     from telemetry.view.view import RerunView
 
 beside.also("rtsim.measures.metrics:compile_measures")
-TOLD_TO_STATIONS = frozenset({"pilot", "aid", "flaps", "throttle", "refused", "advice", "end", "freeze", "thaw"})
+TOLD_TO_STATIONS = frozenset(
+    {"pilot", "aid", "flaps", "throttle", "rotor_speed", "refused", "advice", "end", "freeze", "thaw", "fuel"}
+)
 """Events that ground stations are told of as text."""
 VIEW_PATIENCE_S = 1.5
 """How long the first frame waits for a view that is starting [s]; the flight begins without it after that."""

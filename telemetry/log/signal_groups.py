@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rtsim.frame import Signal
+from rtsim.frame import UNITS, Signal
 from telemetry.log.format import LOG_SIGNALS
 
 FLAGS = frozenset({"frame", "time_s", "corridor_level", "on_downstop", "control_on_stop", "pilot_mode"})
 """Signals that are no curves: the time itself, and states, which are shown as such."""
 
 
-_UNIT_ENDINGS = (
-    "_rad_s", "_deg_s", "_kt_s", "_m_s", "_inlb", "_shp", "_rpm", "_deg", "_kt", "_lb", "_us", "_m", "_s",
-)  # fmt: skip
+_UNIT_ENDINGS = sorted((unit.suffix for unit in UNITS.values() if unit.suffix), key=len, reverse=True)
 """How signals end in their unit, longer ones first."""
 _TITLES = {
     "plots/position/m_per_s": "Velocity in body axes",
     "plots/controls/plain": "Stick and lever",
+    "plots/rotor/plain": "Rotor load CT/sigma, advance ratio",
     "plots/controls/deg": "Control angles",
     "plots/corridor/kn": "Margins to the corridor",
     "plots/corridor/deg": "Nacelle travel to the corridor",

@@ -245,9 +245,10 @@ def _draw_numerals(art: LineArt, row: FloatArray) -> None:
     art.text(f"{nacelle:.1f}\N{DEGREE SIGN}", 8.0, 133.0, height=13.0, colour=WHITE, align="right", weight=1.25)
     art.text(f"ref {reference:.1f}\N{DEGREE SIGN}", 7.0, 149.0, height=6.5, colour=CYAN, align="right")
     flapping = float(row[COLUMN.flapping_deg])
+    short = row[COLUMN.engine_power_shp] > row[COLUMN.engine_power_available_shp]
     entries = (
         ("flapping", f"{flapping:.1f}\N{DEGREE SIGN}", AMBER if flapping > 6.0 else WHITE),
-        ("power shp", f"{row[COLUMN.power_shp]:.0f}", WHITE),
+        ("power shp", f"{row[COLUMN.power_shp]:.0f}", AMBER if short else WHITE),
         ("torque in lb", f"{row[COLUMN.mast_torque_inlb] / 1000.0:.0f} k", WHITE),
         ("load factor", f"{row[COLUMN.load_factor]:.2f}", WHITE),
     )

@@ -14,6 +14,7 @@ import pytest
 
 import scenarios
 from rtsim.cli.main import run
+from rtsim.frame import COLUMN
 from rtsim.processes import safe_environment
 from rtsim.protection.monitor import MarginMonitor
 from rtsim.realtime.control import FlightControl
@@ -21,6 +22,7 @@ from scenarios.files.options import Overrides
 from scenarios.flight.limit_watch import LimitWatch
 from scenarios.flight.replay import replay_log
 from scenarios.flight.runner import FlightOutputs
+from telemetry.log.format import LogEvent
 
 LAWS = """
 import time
@@ -154,6 +156,29 @@ def test_a_reset_in_the_first_frames_begins_the_levels_anew() -> None:
     for row in (*rows[:4], *rows[:20]):
         watch.row(row)
     assert watch._frame == 19  # 4 rows, then two batches of ten; not parted, the last batch would end with row 15
+
+
+def test_limits_that_only_caution_are_told_as_cautions() -> None:
+    """The others from a warning on: a caution of the torque belongs to every climb."""
+    rows = scenarios.fly("hover", speed="max", overrides=Overrides(duration=4.0)).rows.copy()
+    rows[250:350, COLUMN.thrust_coefficient_over_solidity] = 0.2
+    rows[500:600, COLUMN.engine_power_shp] = 0.95 * rows[500:600, COLUMN.engine_power_available_shp]
+    rows[700:800, COLUMN.engine_power_shp] = 1.1 * rows[700:800, COLUMN.engine_power_available_shp]
+    events: list[LogEvent] = []
+    watch = LimitWatch("design", events.append, dt=0.004)
+    watch.rows(rows)
+    assert [(event.frame, event.text, event.level) for event in events] == [
+        (274, "rotor endurance caution: 11.2 % beyond the limit", "caution"),
+        (599, "rotor endurance clear again", "info"),
+        (724, "engine power exceedance: 10.0 % beyond the limit", "exceedance"),
+    ]
+    limits = watch.summary()["limits"]
+    assert limits["rotor_endurance"]["outside_s"] == pytest.approx(0.4)
+    assert limits["engine_power"] == {
+        "worst_margin": pytest.approx(-10.0),
+        "unit": "%",
+        "outside_s": pytest.approx(0.4),
+    }
 
 
 def test_calls_that_a_slow_law_missed_live_are_missed_in_the_replay(own_laws: Path) -> None:

@@ -82,6 +82,15 @@ def test_command_answers(capsys):
     assert "figure of merit" in capsys.readouterr().out
 
 
+def test_stall_delay_raises_the_largest_thrust():
+    largest = {
+        law: max(p.thrust_coefficient for p in IsolatedRotor.load({"rotor.stall_delay": law}).polar(HOVER))
+        for law in ("none", "du_selig", "corrigan_schillings")
+    }
+    assert largest["none"] < largest["du_selig"] < largest["corrigan_schillings"]
+    assert max(p.thrust_coefficient for p in ROTOR.polar(HOVER)) == largest["corrigan_schillings"]
+
+
 def test_command_says_where_there_is_no_solution(capsys):
     assert run(["rotor", "--thrust-coefficient", "0.04", "--tip-mach", "0.65", "--json"]) == 2
     told = capsys.readouterr()

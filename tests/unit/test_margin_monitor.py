@@ -20,7 +20,14 @@ from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limits
-from rtsim.protection.monitor import MarginHistory, MarginMonitor, MarginWatch, sensor_array, sensors_of_rows
+from rtsim.protection.monitor import (
+    MarginHistory,
+    MarginMonitor,
+    MarginWatch,
+    driven_of_rows,
+    sensor_array,
+    sensors_of_rows,
+)
 from rtsim.units import DEGREE, INCH_POUND, KNOT, deg, kt, to_deg, to_kt
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -221,6 +228,59 @@ def test_what_is_watched_in_pieces_is_watched_as_a_whole(monitor):
     assert "downstop_gate" not in found
 
 
+def watched_row(monitor, **columns):
+    """Margins and the watch after one row with these columns; the others stand at a calm flight."""
+    rows = np.zeros((200, SIGNAL_COUNT))
+    calm = {"airspeed_kt": 105.0, "airspeed_indicated_kt": 105.0, "nacelle_deg": 50.0, "load_factor": 1.0}
+    for name, value in (calm | {"altitude_m": 100.0, "time_to_limit_s": 6.0} | columns).items():
+        rows[:, getattr(COLUMN, name)] = value
+    watch = MarginWatch(monitor.tables, load_levels(), 0.004)
+    margins, levels = watch.look(sensors_of_rows(rows), rows[:, COLUMN.time_to_limit_s].copy(), driven_of_rows(rows))
+    named = dict(zip(WATCHED, margins[-1].tolist(), strict=True))
+    return named, dict(zip(WATCHED, levels[-1].tolist(), strict=True)), watch.summary()
+
+
+@pytest.mark.parametrize(("power", "level"), [(2600.0, 0.0), (2800.0, 1.0), (2950.0, 2.0), (3300.0, 3.0)])
+def test_engine_power_is_held_against_what_there_is(monitor, power, level):
+    columns = {"engine_power_shp": power, "engine_power_available_shp": 3000.0}
+    margins, levels, summary = watched_row(monitor, **columns)
+    assert margins["engine_power"] == pytest.approx(1.0 - power / 3000.0)
+    assert levels["engine_power"] == level
+    assert summary["engine_power"]["outside_s"] == (0.8 if power > 3000.0 else 0.0)
+
+
+@pytest.mark.parametrize(("power", "angle", "margin", "level"), [
+    (1856.0, 90.0, 0.2, 0.0), (2552.0, 90.0, -0.1, 1.0), (9280.0, 90.0, -3.0, 1.0), (2552.0, 79.0, None, 0.0),
+])  # fmt: skip
+def test_the_helicopter_transmission_cautions_and_no_more(monitor, power, angle, margin, level):
+    """1160 shp an engine, in helicopter mode; a take-off may use more, so that it never warns."""
+    margins, levels, summary = watched_row(monitor, power_shp=power, nacelle_deg=angle)
+    assert margins["transmission"] == (kernels.FAR if margin is None else pytest.approx(margin))
+    assert levels["transmission"] == level
+    if margin is not None:
+        assert summary["transmission"]["outside_s"] == (0.8 if margin < 0.0 else 0.0)
+
+
+@pytest.mark.parametrize(("ratio", "angle", "limit"), [
+    (0.0, 90.0, 0.1798), (0.057, 90.0, 0.1483), (0.456, 75.0, 0.0421), (0.6, 75.0, 0.0421), (0.114, 60.0, 0.1225),
+    (0.228, 10.0, 0.0618), (0.228, 30.0, 0.0618), (0.285, 45.0, (0.0449 + 0.0685) / 2.0), (0.0285, 80.0, 0.16405),
+])  # fmt: skip
+def test_rotor_endurance_is_the_published_table(monitor, ratio, angle, limit):
+    """NASA CR-166536 table 1-II, by advance ratio and nacelle angle; beyond it a caution, however far."""
+    columns = {"advance_ratio": ratio, "nacelle_deg": angle}
+    for load in (0.5 * limit, 1.5 * limit):
+        margins, levels, _ = watched_row(monitor, thrust_coefficient_over_solidity=load, **columns)
+        assert margins["rotor_endurance"] == pytest.approx(1.0 - load / limit)
+        assert levels["rotor_endurance"] == (1.0 if load > limit else 0.0)
+
+
+def test_what_only_the_frame_knows_is_not_watched_from_sensors_alone(monitor):
+    got = reading(monitor)
+    for name in ("engine_power", "transmission", "rotor_endurance"):
+        assert got.margins[name] == kernels.FAR
+        assert got.levels[name] == "clear"
+
+
 TOY = """
 import importlib.util, json, sys
 import numpy as np
@@ -251,7 +311,7 @@ def test_a_new_limit_needs_the_kernel_and_the_data_alone(tmp_path):
     """A toy limit has its margin, level, unit and number wherever limits are."""
     text = (ROOT / "rtsim/protection/monitor_kernels.py").read_text(encoding="utf-8")
     for place, line in (
-        ('    "sink": "sink rate",\n', '    "climb": "climb rate",\n'),
+        ('    "rotor_endurance": "rotor endurance",\n', '    "climb": "climb rate",\n'),
         ("LIMIT_NUMBERS = {\n", '    "climb": ("climb_m_s", 0.0, 100.0),\n'),
         (
             "    nz = sensors[SENSOR.load_factor]\n",

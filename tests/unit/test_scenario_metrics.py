@@ -43,6 +43,7 @@ KEYS = {
     "pitch_deg": ("min", "max"),
     "stick": ("rms_in", "rms_rate_in_s", "travel_in"),
     "lever": ("rms", "rms_rate_per_s", "travel"),
+    "fuel_lb": ("used",),
 }
 
 
@@ -305,6 +306,7 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
         "torque_over_s": (torque > 1.02).sum() * DT,
         "mast_torque_max_inlb": of("mast_torque_inlb").max(),
         "engine_power_max_shp": of("engine_power_shp").max(),
+        "fuel_used_lb": of("fuel_flow_lb_h").sum() * DT / 3600.0,
         "energy_mj": of("engine_power_shp").sum() * DT * 745.6998715822702e-6,
         "load_factor_max": of("load_factor").max(),
         "load_factor_min": of("load_factor").min(),

@@ -7,9 +7,9 @@ from rtsim.validation.check import Check, Measure, Series
 from rtsim.validation.declared.asking import label
 from rtsim.validation.published import Table
 
-_CLIMB, _SPEEDS, _ENGINE = Table("climb"), Table("speeds"), Table("engine")
+_CLIMB, _SPEEDS = Table("climb"), Table("speeds")
 _POWER = float(_CLIMB.content["rotor_shp"])
-_RPM = float(_ENGINE.content["rpm_740_ft_s"])
+_RPM = float(_CLIMB.content["rotor_rpm"])
 _BAND = (-630.0, 290.0)
 """Our band [ft/min]: that printed for the same source's level power, -10 to +28 % of 752 shp at 60 kn, as climb of
 13000 lb, and 100 ft/min of reading. A model that needs more power climbs less."""
@@ -71,7 +71,8 @@ def _upright() -> Check:
 
 def _autorotation() -> list[Check]:
     flown = Series(name="climb.autorotation.flown", quantity="sink in autorotation", unit="ft/min", decimals=0,
-                   reason="torque in upflow too high by 0.0006 CQ/sigma, as against a wind-tunnel test")  # fmt: skip
+                   reason="torque in upflow too high, by 0.0006 CQ/sigma against a wind-tunnel test; none: the power "
+                   "does not fall to zero")  # fmt: skip
     chart = Series(name="climb.autorotation.chart", quantity="sink in autorotation, chart of 1975", unit="ft/min",
                    decimals=0, reason="nacelle angle of the curve not printed")  # fmt: skip
 
@@ -79,12 +80,24 @@ def _autorotation() -> list[Check]:
         ask = climbing(speed, 90.0, 0.0, rotor_rpm)
         return lambda bench: -ask(bench)
 
+    least = Series(name="climb.autorotation.least_power", quantity="least shaft power in descent", unit="shp",
+                   decimals=0)  # fmt: skip
+    at = Series(name="climb.autorotation.at_least_power", quantity="sink at the least shaft power", unit="ft/min",
+                decimals=0)  # fmt: skip
+
+    def descent(place: int) -> Measure:
+        rotor_rpm = 0.92 / 0.98 * 589.0
+        return lambda bench: bench.least_power_in_descent(80.0, 90.0, flap_deg=40.0, rotor_rpm=rotor_rpm)[place]
+
     # Our band: between predicted and flown.
     low, high = (float(_SPEEDS.content[f"autorotation_sink_fpm_{word}"]) for word in ("predicted", "flight"))
     found = [
         flown.check("", "nacelle 90, flaps 40, 80 kn, 92 % rpm", sink(80.0, 0.92 / 0.98 * 589.0),
                     number=_SPEEDS.number("autorotation_sink_fpm_flight", source="TM81244 text", grade="X"),
-                    limits=(low, high), band_from="ours")
+                    limits=(low, high), band_from="ours"),
+        # Reported: zero or less, or the model does not autorotate there.
+        least.check("", "nacelle 90, flaps 40, 80 kn, 92 % rpm", descent(0), source="none", grade="-"),
+        at.check("", "nacelle 90, flaps 40, 80 kn, 92 % rpm", descent(1), source="none", grade="-"),
     ]  # fmt: skip
     return found + [
         chart.check(label(speed), f"nacelle 90 (assumed), flaps 40, {speed:g} kn, 565 rpm", sink(speed, _RPM),

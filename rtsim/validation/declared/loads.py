@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from rtsim.arrays import FloatArray
 from rtsim.validation.bench import Bench
 from rtsim.validation.check import Check, Measure, Series, both_ways
@@ -20,13 +18,14 @@ _AXES = {"X": 0, "Z": 1, "M": 2}
 _WHOLE = {
     "rotor_total": ("rotor total", "rotors with spinners", "XZM"),
     "wing": ("wing", "wing with download", "XZM"),
+    "fuselage": ("fuselage", "fuselage", "XZM"),
     "htail": ("tail", "horizontal tail", "ZM"),
     "airframe": ("airframe", "airframe without spinners", "XZM"),
 }
 _PARTS = {
     "engine_pylons": ("pylons", "pylon interference drag", "the interference drag is taken in another flow"),
     "hub_spinner": ("spinners", "spinner drag", "the drag is taken in another flow, or acts at another point"),
-    "jet": ("jet", "jet thrust of the engines", "not in the model"),
+    "jet": ("jets", "jet thrust of the engines", "a law in power and airspeed through these four numbers"),
 }
 
 
@@ -90,7 +89,7 @@ def _in_printed_flow() -> list[Check]:
 
 def _asked(loads: _Loads, speed: float, component: str, axis: str) -> Measure:
     def measure(bench: Bench) -> float:
-        return float(loads(bench, speed).get(component, np.zeros(3))[_AXES[axis]])
+        return float(loads(bench, speed)[component][_AXES[axis]])
 
     return measure
 
