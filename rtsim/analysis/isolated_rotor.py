@@ -32,7 +32,7 @@ _EASY, _REACH = deg(5.0), deg(35.0)
 _LARGEST_CHANGE = 0.05
 """Flapping, cyclic [rad] or inflow that changes more in one step has left the branch."""
 _STALL_DROP = 0.0003
-"""The unstalled branch has ended where C_T has fallen so far below the largest."""
+"""The unstalled branch has ended, at either end, where C_T has turned back by so much."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -173,8 +173,8 @@ class IsolatedRotor:
                 point = self.equilibrium(points[-1].collective + step, condition, points[-1])
                 if point is None or np.max(np.abs(point._unknowns - points[-1]._unknowns)) > _LARGEST_CHANGE:
                     break
-                largest = max(point.thrust_coefficient for point in points)
-                if step > 0.0 and point.thrust_coefficient < largest - _STALL_DROP:
+                sign = math.copysign(1.0, step)
+                if sign * point.thrust_coefficient < max(sign * p.thrust_coefficient for p in points) - _STALL_DROP:
                     break
                 points.append(point)
             branches.append(points)

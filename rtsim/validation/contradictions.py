@@ -129,7 +129,7 @@ def _fuel(bench: Bench) -> Contradiction:
     flown, chart = Table("power.fuel_flow_flight"), Table("power.ratio")
 
     def flow(shaft: float) -> float:
-        return fuel_flow(shaft * HORSEPOWER, 0.0) / POUND_FORCE * 3600.0
+        return math.nan if math.isnan(shaft) else fuel_flow(shaft * HORSEPOWER, 0.0) / POUND_FORCE * 3600.0
 
     def predicted(nacelle: int, speed: float) -> float:
         ratio = _between(speed, chart.values(f"n{nacelle}_kn"), chart.values(f"n{nacelle}"))

@@ -53,7 +53,8 @@ def _lines() -> list[Check]:
             series = Series(
                 name=f"flapping.n{nacelle}{'.no_tail_wake' if bare_tail else ''}",
                 quantity="trim flapping" + (", no rotor wake at the tail" if bare_tail else ""),
-                unit="deg", decimals=2, reason=_REASONS[nacelle] if not bare_tail else "not known; with that wake it holds",
+                unit="deg", decimals=2,
+                reason="not known; with that wake it holds" if bare_tail else _REASONS[nacelle],
             )  # fmt: skip
             for i, speed in enumerate(_CHART.values(f"n{nacelle}_kn")):
                 left = speed < stall_speed(nacelle) and nacelle < 75

@@ -69,8 +69,8 @@ def _weights() -> list[Check]:
     """At the published hover weights all of the take-off power is needed, within the printed band of hover power."""
     series = Series(
         name="hover.weights", quantity="power needed over available at the published hover weight", decimals=3,
-        reason="below the band: the model hovers on less power than the source, or the source keeps a margin that it does "
-        "not print; none: the rotor of the model stalls before the power ends",
+        reason="below the band: the model hovers on less power than the source, or the source keeps a margin that it "
+        "does not print; none: the rotor of the model stalls before the power ends",
     )  # fmt: skip
 
     def share(height: float, weight: float) -> Measure:
