@@ -155,11 +155,12 @@ class IsolatedRotor:
             collective, float(found.x[0]), float(thrust), float(torque), float(found.x[1]), float(found.x[2]), found.x
         )
 
-    def polar(self, condition: RotorCondition) -> list[RotorPoint]:
+    def polar(self, condition: RotorCondition, *, lowest_thrust: float = -math.inf) -> list[RotorPoint]:
         """The unstalled branch, by growing collective, from negative thrust to where thrust falls or equilibrium ends.
 
         Args:
             condition: The flow.
+            lowest_thrust: C_T below which nothing is asked for.
         """
         axial = -condition.advance_ratio * math.sin(condition.shaft_angle)
         easy = math.atan2(axial, 0.75) + _EASY
@@ -177,6 +178,8 @@ class IsolatedRotor:
                 if sign * point.thrust_coefficient < max(sign * p.thrust_coefficient for p in points) - _STALL_DROP:
                     break
                 points.append(point)
+                if step < 0.0 and point.thrust_coefficient < lowest_thrust:
+                    break
             branches.append(points)
         return [*reversed(branches[0][1:]), *branches[1]]
 

@@ -401,7 +401,7 @@ class Bench:
             advance_ratio: Advance ratio, shaft normal to the flow.
         """
         condition = RotorCondition(tip_mach=tip_mach, advance_ratio=advance_ratio)
-        return self.once(("polar", condition), lambda: self.rotor.polar(condition))
+        return self.once(("polar", condition), lambda: self.rotor.polar(condition, lowest_thrust=0.0))
 
     def rotor_at(self, thrust_coefficient: float, tip_mach: float) -> RotorPoint | None:
         """The rotor in hover at a thrust.

@@ -12,6 +12,7 @@ import numpy as np
 
 from rtsim.drawing import BLUE, GREEN, GREY, ORANGE, PURPLE, RED, REPORT_STYLE, drawing, save_both
 from rtsim.validation.check import Result
+from rtsim.validation.published import Table
 from rtsim.validation.run import Validation
 
 if TYPE_CHECKING:
@@ -247,12 +248,16 @@ def _climb(validation: Validation, figure: Figure) -> None:
     flown = validation.of_series("climb.autorotation.flown")[0]
     axes[2].plot([80.0], [flown.check.published], "o", color=RED, markersize=5.0, label="flown, 92 % rpm")
     axes[2].plot([80.0], [flown.value], "D", color=MODEL, markersize=4.0, label="model, 92 % rpm")
+    least = validation.of_series("climb.autorotation.at_least_power")[0]
+    axes[2].plot([80.0], [least.value], "D", color=MODEL, markersize=4.5, markerfacecolor="white",
+                 label="model, least power, 92 % rpm")  # fmt: skip
+    axes[2].margins(y=0.12)
     axes[2].set_ylim(bottom=0.0)
     axes[2].legend(loc="lower right")
 
 
 def _hover(validation: Validation, figure: Figure) -> None:
-    weights, roots = figure.subplots(1, 2)
+    weights, ceiling = figure.subplots(1, 2)
     x, _, model = _arrays(validation.of_series("hover.weights"))
     low, high = validation.of_series("hover.weights")[0].check.band or (1.0, 1.0)
     weights.axhspan(low, high, color="black", alpha=0.10, linewidth=0)
@@ -261,7 +266,58 @@ def _hover(validation: Validation, figure: Figure) -> None:
     weights.set(xlabel="height, ft", ylabel="power needed / available", title="hover at the published weights",
                 ylim=(0.85, 1.2), xlim=(-300, 10500))  # fmt: skip
     weights.legend()
+    _ceiling(validation, ceiling)
+
+
+def _ceiling(validation: Validation, axes: Axes) -> None:
+    """The three published ceilings, the band about them, the model."""
+    result = validation.of_series("hover.ceiling")[0]
+    table = Table("hover.ceiling").content
+    names = ("X62407, text", "X62407, figure", "SP-4517", "model")
+    values = [float(table[f"{word}_ft"]) for word in ("text", "figure", "history")]
+    if result.check.band is not None:
+        axes.axhspan(*result.check.band, color="black", alpha=0.10, linewidth=0)
+    axes.bar(names, [*values, result.value], color=[GREY, GREY, GREY, MODEL], width=0.55)
+    axes.set(ylabel="height, ft", title="hover ceiling out of ground effect, 13 000 lb")
+
+
+def _dynamics(validation: Validation, figure: Figure) -> None:
+    roots, places = figure.subplots(1, 2)
     _hover_roots(validation, roots)
+    _places(places, [one for one in validation.of_group("dynamics") if one.check.band is not None])
+    places.set_title("where each number lies in its band")
+
+
+def _places(axes: Axes, results: Sequence[Result]) -> None:
+    """Each number as a place within its band, from -1 to 1, with the published one where there is one."""
+    shown = [one for one in results if one.check.band is not None and one.check.band[0] < one.check.band[1]]
+    for row, one in enumerate(reversed(shown)):
+        low, high = one.check.band or (0.0, 1.0)
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        axes.plot([-1.0, 1.0], [row, row], color="black", alpha=0.10, linewidth=9.0, solid_capstyle="butt")
+        if one.check.published is not None:
+            axes.plot((one.check.published - middle) / half, row, "s", color="black", markersize=4.5)
+        colour = RED if one.status == "misses" else MODEL
+        axes.plot((one.value - middle) / half, row, "o", color=colour, markersize=6.0)
+    axes.set_yticks(range(len(shown)), [_named(one) for one in reversed(shown)])
+    axes.set(xlabel="band from -1 to 1; square: published, dot: model", ylim=(-0.7, len(shown) - 0.3))
+
+
+def _named(result: Result) -> str:
+    """The quantity, and which of its series."""
+    check = result.check
+    return check.quantity if check.id == check.series else f"{check.quantity}, {check.id.rsplit('.', 1)[1].upper()}"
+
+
+def _fidelity(validation: Validation, figure: Figure) -> None:
+    axes = figure.subplots(1, 1)
+    results = [one for one in validation.of_group("fidelity") if one.check.band is not None]
+    shares = [100.0 * one.value / one.check.band[1] for one in results if one.check.band is not None]
+    names = [one.check.id.removeprefix("fidelity.").replace(".", ", ").rsplit("_", 1)[0] for one in results]
+    colours = [RED if one.status == "misses" else MODEL for one in results]
+    axes.barh(names[::-1], shares[::-1], color=colours[::-1], height=0.6)
+    axes.axvline(100.0, color="black", linewidth=1.0)
+    axes.set(xlabel="difference between LPV and nonlinear, % of what is allowed", xlim=(0.0, max(110.0, *shares)))
 
 
 def _hover_roots(validation: Validation, axes: Axes) -> None:
@@ -301,7 +357,9 @@ FIGURES: tuple[PlannedFigure, ...] = (
     PlannedFigure("validation_flapping", "flapping", "Trim flapping against the chart of 1975", _flapping, (17.0, 3.8)),
     PlannedFigure("validation_stall", "stall", "Low-speed boundary", _stall, (10.0, 4.2)),
     PlannedFigure("validation_climb", "climb", "Climb and autorotation", _climb, (13.0, 4.0)),
-    PlannedFigure("validation_hover", "hover", "Hover weights against height, and roots in hover", _hover, (10.0, 4.2)),
+    PlannedFigure("validation_hover", "hover", "Hover weights against height, and hover ceiling", _hover, (10.0, 4.2)),
+    PlannedFigure("validation_dynamics", "dynamics", "Roots in hover, controls, responses", _dynamics, (13.0, 4.6)),
+    PlannedFigure("validation_fidelity", "fidelity", "LPV aircraft against the nonlinear one", _fidelity, (8.0, 3.8)),
 )
 """The figures, in the order of the report."""
 
