@@ -1,6 +1,6 @@
 """Writes docs/validation.md, its figures and the list of known misses that the tests hold the model to.
 
-After a change of the aircraft, of a check or of the published data (three minutes on two cores):
+After a change of the aircraft, of a check or of the published data (four minutes on two cores):
 
     python -m docs.validation
 """

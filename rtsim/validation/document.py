@@ -88,7 +88,8 @@ def _group(title: str, name: str, validation: Validation) -> Iterable[Block]:
             yield Picture(figure.stem, figure.title)
     for results in series_of(validation.of_group(name)).values():
         check = results[0].check
-        yield Heading(f"{check.quantity}{f', {check.unit}' if check.unit else ''}: {verdict(results)}", 3)
+        unit = f" [{check.unit}]" if check.unit else ""
+        yield Heading(f"{series_row(results).quantity}{unit}: {verdict(results)}", 3)
         sources = "; ".join(dict.fromkeys(f"{one.check.source} ({one.check.grade})" for one in results))
         band = next((one.check.band_from for one in results if one.check.band_from), "")
         words = f"Source: {sources}. {f'Band: {band}.' if band else 'No band: reported.'}"
