@@ -16,7 +16,7 @@ PilotMode = Literal["mocm", "external", "hold"]
 """Who holds the sticks: the virtual pilot, somebody else (a person, a plug-in, a recording), or nobody."""
 AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
 """What acts between the pilot's hands and the control mixing."""
-SwitchName = Literal[AidName, "automatic_flaps", "governor"]
+SwitchName = Literal[AidName, "automatic_flaps", "governor", "automatic_rotor_speed"]
 """All that can be switched in flight: the aids, and what moves flaps and rotors whoever flies."""
 
 OUTER_LOOPS: tuple[OuterLoop, ...] = get_args(OuterLoop)

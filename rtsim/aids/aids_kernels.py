@@ -19,8 +19,8 @@ from rtsim.places import Places
 RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4
 AID_COUNT = 5
 """Aids that act on the controls; the switches of flaps and rotor drive follow."""
-AUTOMATIC_FLAPS, GOVERNOR = 5, 6
-SWITCH_COUNT = 7
+AUTOMATIC_FLAPS, GOVERNOR, AUTOMATIC_ROTOR_SPEED = 5, 6, 7
+SWITCH_COUNT = 8
 MEMORY = Places(
     "pitch_reference",
     "altitude_reference",

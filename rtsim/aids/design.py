@@ -12,6 +12,7 @@ from rtsim.aids.aids_kernels import (
     ALTITUDE_HOLD,
     ATTITUDE_RETENTION,
     AUTOMATIC_FLAPS,
+    AUTOMATIC_ROTOR_SPEED,
     GOVERNOR,
     MAP,
     RATE_DAMPING,
@@ -36,8 +37,10 @@ SWITCHES: dict[SwitchName, int] = {
     "trim_bias": TRIM_BIAS,
     "automatic_flaps": AUTOMATIC_FLAPS,
     "governor": GOVERNOR,
+    "automatic_rotor_speed": AUTOMATIC_ROTOR_SPEED,
 }
-"""Everything that can be switched, by name, with its place in the switches. The last two are on unless switched off."""
+"""Everything that can be switched, by name, with its place in the switches. Flaps and governor are on unless switched
+off."""
 AIDS: dict[AidName, int] = {name: SWITCHES[name] for name in get_args(AidName)}
 """The aids among them."""
 RIGID_BODY = ("u", "w", "q", "pitch")

@@ -221,7 +221,7 @@ def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     database = aircraft.database
     flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
     values = _named(point, database.states, database.inputs, database.outputs)
-    configuration = (to_deg(flap), to_rpm(database.rotor_speed))
+    configuration = (to_deg(flap), to_rpm(database.governed_speed))
     return _trim_result(request, database.profile, values, configuration, point.converged), point
 
 

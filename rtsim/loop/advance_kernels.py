@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, MEMORY
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVERNOR, MEMORY
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
@@ -18,12 +18,13 @@ from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
-from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, PART, REFERENCE, STATION, Flight
+from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, MOTION, PART, PROGRAMME, REFERENCE, STATION, Flight
+from rtsim.loop.observe_kernels import programme_at, programmed
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
-from rtsim.systems.drive_kernels import DEVIATION, drive_advance, engine_power
+from rtsim.systems.drive_kernels import HELD_OFFSET, LOCKED, drive_advance, engine_power, held_advance, rotor_speed_now
 from rtsim.systems.engine_kernels import burn
 from rtsim.systems.flap_kernels import flap_advance
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
@@ -36,6 +37,8 @@ LANDING_NACELLE = 60.0 * DEGREE
 """Below this nacelle angle the proprotors (12.5 ft radius) would strike the ground."""
 LANDING_SPEED = 60.0 * KNOT
 LARGEST_PITCH = 80.0 * DEGREE
+_SPARE_S = 1.0
+"""The rotors are back at full speed this long before the programme moves the nacelles [s]."""
 
 
 @inner_kernel
@@ -156,7 +159,10 @@ def fail(flight: Flight) -> None:
     tables, state = flight.tables, flight.state
     protected, acting = flight.scratch.command[STATION.protected], flight.scratch.command[STATION.acting]
     acting[CHANNEL.stick], acting[CHANNEL.lever] = protected[CHANNEL.stick], protected[CHANNEL.lever]
-    rate = fault_nacelle_rate(state.faults, protected[CHANNEL.nacelle_rate])
+    wanted = protected[CHANNEL.nacelle_rate]
+    if state.drive[HELD_OFFSET] != 0.0:  # the nacelles stay on the downstop until the rotors are back at full speed
+        wanted = min(wanted, 0.0)
+    rate = fault_nacelle_rate(state.faults, wanted)
     acting[CHANNEL.nacelle_rate] = nacelle_effective_rate(tables.nacelle, state.nacelle, rate, tables.dt)
 
 
@@ -223,6 +229,9 @@ def move_plant(flight: Flight) -> None:
     failing = faults_act(flight)
     if failing:
         call_at(flight.parts[PART.fail], flight)
+    if state.drive[HELD_OFFSET] != 0.0 and tables.drive.held_acts == 0.0:
+        for row in range(3):
+            scratch.path[row, 0] = scratch.known[KNOWN.place]
     _turn_systems(flight)
     state.clock[CLOCK.flags] = call_at(
         flight.parts[PART.step], tables.plant.aircraft, x, u, scratch.path, dt, scratch.work
@@ -244,6 +253,24 @@ def _turn_systems(flight: Flight) -> None:
     lever = scratch.command[STATION.acting, CHANNEL.lever]
     available = state.faults[FAULT.power] if state.faults[FAULT.engine] != 0.0 else tables.drive.power[-1]
     drive_advance(tables.drive, state.drive, governed, torque, lever, available, tables.dt)
+    if tables.drive.slow_offset != 0.0:
+        lowers = state.switches[AUTOMATIC_ROTOR_SPEED] != 0.0
+        angle = scratch.motion[MOTION.angle]
+        held_advance(tables.drive, state.drive, lowers, angle, _nacelles_leave(flight), tables.dt)
+
+
+@inner_kernel
+def _nacelles_leave(flight: Flight) -> bool:
+    """Whether somebody asks the nacelles off the downstop, or the programme will before the rotors are back up."""
+    tables, state = flight.tables, flight.state
+    if flight.scratch.command[STATION.protected, CHANNEL.nacelle_rate] > 0.0:
+        return True
+    if state.clock[CLOCK.mode] != MODE.mocm or tables.automatic.active != 0:
+        return False
+    drive = tables.drive
+    back = (-drive.slow_offset / drive.change_rate + _SPARE_S) + state.clock[CLOCK.frame] * tables.dt
+    low, share = programme_at(tables.programme, back)
+    return programmed(tables.programme, PROGRAMME.nacelle, low, share) > LOCKED
 
 
 @inner_kernel
@@ -330,7 +357,7 @@ def _end_code(flight: Flight) -> int:
         if upright and sink <= HARD_SINK_RATE:
             return END.hard_landing
         return END.crash
-    rotor_speed = drive.governed_speed + state.drive[DEVIATION]
+    rotor_speed = rotor_speed_now(drive, state.drive)
     if rotor_speed > drive.highest:
         return END.rotors_fast
     if not rotor_speed >= drive.lowest:

@@ -50,9 +50,9 @@ PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
 """Rows of the programme."""
 MOTION = Places("angle", "rate", "acceleration")
 """The nacelles now [rad, rad/s, rad/s^2]."""
-KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air")
+KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air", "place")
 """Flap deflection of the schedule [rad]; airspeed of the programme at the end of the frame, and of the aircraft at its
-start, gusts excepted [m/s]."""
+start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""
@@ -157,8 +157,7 @@ class SimulationState(NamedTuple):
     flaps: FloatArray
     """Deflection of the flaps, whether they follow their schedule, and their setting."""
     drive: FloatArray
-    """Rotor speed less the governed one, engine power, its offset from the throttle's law, whether governed, throttle
-    trim."""
+    """State of the rotor drive, see ``rtsim.systems.drive_kernels``."""
     tank: FloatArray
     """Fuel left and what the tanks hold, ``TANK``."""
     gusts: FloatArray

@@ -25,6 +25,7 @@ from rtsim.loop.data import (
     CLOCK,
     END,
     END_REASONS,
+    KNOWN,
     MOTION,
     PART,
     Flight,
@@ -201,8 +202,8 @@ class Flying:
         self.do(frames_of.OBSERVE)
         tables, state, scratch = self.tables, self.state, self.scratch
         present = np.array([state.u[INPUT.stick], state.u[INPUT.lever]])
-        angle, rate = (float(scratch.motion[place]) for place in (MOTION.angle, MOTION.rate))
-        _ENGAGE(tables.pilot, state.pilot, scratch.seen, angle, rate, scratch.target, present)
+        place, rate = float(scratch.known[KNOWN.place]), float(scratch.motion[MOTION.rate])
+        _ENGAGE(tables.pilot, state.pilot, scratch.seen, place, rate, scratch.target, present)
 
     def take(self, state: SimulationState) -> None:
         """Take another state.

@@ -19,13 +19,13 @@ from rtsim.loop.data import CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Fl
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.pilot.layout_kernels import TARGET
-from rtsim.systems.drive_kernels import DEVIATION, engine_power
+from rtsim.systems.drive_kernels import DEVIATION, HELD_OFFSET, engine_power, rotor_speed_now, schedule_angle
 from rtsim.systems.engine_kernels import TANK, advance_ratio, fuel_flow, takeoff_power, thrust_over_solidity
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
 
 
 @inner_kernel
-def _programme_at(programme: FloatArray, time: float) -> tuple[int, float]:
+def programme_at(programme: FloatArray, time: float) -> tuple[int, float]:
     """Find a time in the programme, which is linear between its points and held before the first and after the last.
 
     Args:
@@ -44,8 +44,8 @@ def _programme_at(programme: FloatArray, time: float) -> tuple[int, float]:
 
 
 @inner_kernel
-def _programmed(programme: FloatArray, row: int, low: int, share: float) -> float:
-    """Value of one row of the programme at what ``_programme_at`` found."""
+def programmed(programme: FloatArray, row: int, low: int, share: float) -> float:
+    """Value of one row of the programme at what ``programme_at`` found."""
     if share == 0.0:
         return programme[row, low]
     return programme[row, low] + share * (programme[row, low + 1] - programme[row, low])
@@ -76,9 +76,13 @@ def observe(flight: Flight) -> None:
     flap_scheduled = nonlinear.flap_schedule(tables.plant.controls, speed, angle)
     scratch.known[KNOWN.flap] = flap_scheduled
     flap_inputs(tables.flaps, state.flaps, flap_scheduled, state.u)
-    state.u[INPUT.rotor_speed] = state.drive[DEVIATION]
+    drive = state.drive
+    place = schedule_angle(tables.drive, drive, angle)
+    scratch.known[KNOWN.place] = place
+    state.u[INPUT.rotor_speed] = drive[DEVIATION] + tables.drive.held_acts * drive[HELD_OFFSET]
+    where = place if tables.drive.held_acts == 0.0 else angle
     aircraft = tables.plant.aircraft
-    call_at(flight.parts[PART.outputs], aircraft, x, state.u, angle, scratch.y, scratch.xdot, scratch.work)
+    call_at(flight.parts[PART.outputs], aircraft, x, state.u, where, scratch.y, scratch.xdot, scratch.work)
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     through = x[STATE.u] * ct + x[STATE.w] * st
     scratch.known[KNOWN.airspeed_in_air] = through
@@ -87,7 +91,7 @@ def observe(flight: Flight) -> None:
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
     _see(flight, airspeed)
     y = scratch.y
-    rotor_speed = tables.drive.governed_speed + state.drive[DEVIATION]
+    rotor_speed = rotor_speed_now(tables.drive, state.drive)
     power = 2.0 * y[OUTPUT.torque] * rotor_speed
 
     _ask(flight, time)
@@ -167,16 +171,16 @@ def _ask(flight: Flight, time: float) -> None:
     """Fill what the pilot is asked for: filtered airspeed and its rate, altitude and climb rate, nacelle rate."""
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     target, programme = scratch.target, tables.programme
-    now, now_share = _programme_at(programme, time)
-    end, end_share = _programme_at(programme, time + tables.dt)
-    scratch.si[QUANTITY.airspeed_command] = _programmed(programme, PROGRAMME.airspeed, now, now_share)
-    scratch.known[KNOWN.airspeed_ahead] = _programmed(programme, PROGRAMME.airspeed, end, end_share)
+    now, now_share = programme_at(programme, time)
+    end, end_share = programme_at(programme, time + tables.dt)
+    scratch.si[QUANTITY.airspeed_command] = programmed(programme, PROGRAMME.airspeed, now, now_share)
+    scratch.known[KNOWN.airspeed_ahead] = programmed(programme, PROGRAMME.airspeed, end, end_share)
     target[TARGET.airspeed] = state.reference[REFERENCE.airspeed]
     target[TARGET.airspeed_rate] = state.reference[REFERENCE.rate]
-    target[TARGET.altitude] = _programmed(programme, PROGRAMME.altitude, now, now_share)
-    ahead = _programmed(programme, PROGRAMME.altitude, end, end_share)
+    target[TARGET.altitude] = programmed(programme, PROGRAMME.altitude, now, now_share)
+    ahead = programmed(programme, PROGRAMME.altitude, end, end_share)
     target[TARGET.climb_rate] = (ahead - target[TARGET.altitude]) / tables.dt
-    wanted = _programmed(programme, PROGRAMME.nacelle, end, end_share)
+    wanted = programmed(programme, PROGRAMME.nacelle, end, end_share)
     wanted_rate = (wanted - state.nacelle[0]) / tables.dt
     if tables.automatic.active != 0:
         wanted_rate = call_at(flight.parts[PART.automatic_rate], flight)

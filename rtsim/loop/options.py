@@ -16,8 +16,10 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from rtsim.choices import BUILT_IN_PILOT, HAND_PILOT, PASSIVE_LAWS, AidName, CorridorName, OuterLoop, PlantName
 from rtsim.errors import InputError, suggestion
-from rtsim.units import KNOT, POUND_FORCE
+from rtsim.units import KNOT, POUND_FORCE, RPM
 
+FULL_ROTOR_SPEED = 589.0 * RPM
+"""Rotor speed of a flight that is asked for none: the XV-15's in conversion, and another aircraft's own [rad/s]."""
 FULL_TANKS = 1490.0 * POUND_FORCE
 """Fuel of a flight that is asked for none: the XV-15's full tanks, and another aircraft's own [N]."""
 _PLUG_IN = r"[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?"
@@ -233,6 +235,25 @@ class FlightOptions:
         True,
         help="Let the governor hold the rotor speed from the start, whoever flies.",
         panel="Who flies what",
+        page="systems.md",
+    )
+    automatic_rotor_speed: bool = option(
+        False,
+        help="Let the rotors come down to airplane speed by themselves on the downstop, and back up before the nacelles"
+        " move.",
+        panel="Who flies what",
+        page="systems.md",
+    )
+    rotor_speed: float = option(
+        FULL_ROTOR_SPEED,
+        help="Rotor speed at the start, on the downstop: down to that of airplane mode.",
+        panel="Start",
+        key="rotor_rpm",
+        unit="rpm",
+        factor=RPM,
+        low=10.0,
+        high=30000.0,
+        default_words="that of the conversion, 589",
         page="systems.md",
     )
     fuel: float = option(

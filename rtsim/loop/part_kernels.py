@@ -17,7 +17,7 @@ from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
 from rtsim.protection.law_kernels import law_decide, law_watch
-from rtsim.systems.drive_kernels import DEVIATION, governor_power
+from rtsim.systems.drive_kernels import governor_power, rotor_speed_now
 from rtsim.systems.flap_kernels import flap_now, flap_parts
 
 
@@ -30,7 +30,7 @@ def ask_mocm(flight: Flight) -> float:
     """
     scratch = flight.scratch
     command = scratch.command[STATION.pilot]
-    angle = scratch.motion[MOTION.angle]
+    angle = scratch.known[KNOWN.place]
     mocm_output_in(flight.tables.pilot, flight.state.pilot, angle, scratch.target, command, scratch.pilot)
     command[CHANNEL.nacelle_rate] = scratch.target[TARGET.nacelle_rate]
     return 0.0
@@ -45,7 +45,7 @@ def advance_mocm(flight: Flight, normals: FloatArray) -> float:
         normals: Standard normals of its noise; none: no noise.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
-    scalars = (scratch.motion[MOTION.angle], scratch.motion[MOTION.rate], tables.dt)
+    scalars = (scratch.known[KNOWN.place], scratch.motion[MOTION.rate], tables.dt)
     acting = scratch.command[STATION.protected]
     mocm_advance_in(tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, normals, scratch.pilot)
     return 0.0
@@ -88,8 +88,9 @@ def act_aids(flight: Flight) -> float:
     airspeed = aids_airspeed(state.aids, state.switches, scratch.seen)
     expected = flap_schedule(tables.plant.controls, airspeed, angle)
     flap_parts(tables.flaps, flap_now(state.flaps, scratch.known[KNOWN.flap]), expected, scratch.flaps)
+    place = scratch.known[KNOWN.place]
     aids_step(
-        tables.aids, state.aids, state.switches, scratch.seen, angle, hands, scratch.flaps, aided, tables.dt
+        tables.aids, state.aids, state.switches, scratch.seen, place, hands, scratch.flaps, aided, tables.dt
     )  # fmt: skip
     return 0.0
 
@@ -136,7 +137,7 @@ def fail_actuators(flight: Flight) -> float:
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     acting = scratch.command[STATION.acting]
     torque = 2.0 * scratch.y[OUTPUT.torque]
-    power = torque * (tables.drive.governed_speed + state.drive[DEVIATION])
+    power = torque * rotor_speed_now(tables.drive, state.drive)
     # Where an engine fails, collective is taken off until the power suffices to bring the rotors back too.
     power = governor_power(tables.drive, state.drive, power)
     governed = state.switches[GOVERNOR] != 0.0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, GOVERNOR, MEMORY
+from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVERNOR, MEMORY
 from rtsim.aids.design import design_aids, switches_of
 from rtsim.aircraft.controls import control_tables
 from rtsim.aircraft.points import Condition
@@ -45,7 +45,7 @@ from rtsim.loop.data import (
     SimulationTables,
 )
 from rtsim.loop.flying import Flying, Measure, new_streams
-from rtsim.loop.options import FULL_TANKS, FlightOptions, declared
+from rtsim.loop.options import FULL_ROTOR_SPEED, FULL_TANKS, FlightOptions, declared
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
@@ -68,9 +68,10 @@ from rtsim.protection.law_data import LAW, WORK_SIZE, ProtectionTables
 from rtsim.protection.law_kernels import law_start
 from rtsim.protection.laws import load_laws
 from rtsim.protection.tables import law_tables
-from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED
+from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED, HELD_OFFSET, HELD_SETTING
 from rtsim.systems.engine import load_engine_tables
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
+from rtsim.systems.requests import held_offset
 from rtsim.systems.settings import load_drive_tables, load_flap_tables
 from rtsim.units import to_deg, to_kt
 
@@ -129,6 +130,8 @@ class Parts:
     """Trimmed state at the start."""
     start_u: FloatArray = field(repr=False)
     """Trimmed inputs at the start."""
+    start_held: float = 0.0
+    """Held rotor speed at the start, less the governed one [rad/s]."""
 
 
 def _start(setup: FlightSetup) -> tuple[float, float, float]:
@@ -137,20 +140,23 @@ def _start(setup: FlightSetup) -> tuple[float, float, float]:
 
 
 @functools.lru_cache(maxsize=16)
-def start_trim(nonlinear: bool, database: Database, airspeed: float, nacelle: float) -> tuple[FloatArray, FloatArray]:
+def start_trim(
+    nonlinear: bool, database: Database, airspeed: float, nacelle: float, held: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
     """Trimmed state and inputs in level flight, altitude 0, read-only; kept, since batches start alike.
 
     Args:
         nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
+        held: Rotor speed [rad/s], and its place on the nacelle axis of the database [rad].
 
     Raises:
         InputError: There is no trim.
     """
     if nonlinear:
-        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle))
+        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held[0]))
         converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
     else:
-        point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=nacelle)
+        point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=held[1])
         converged, x, u = point.converged, point.x.copy(), point.u.copy()
     if not converged:
         raise InputError(
@@ -196,7 +202,10 @@ def build_parts(setup: FlightSetup) -> Parts:
         )  # fmt: skip
     own = Xv15.load().tables
     airspeed, nacelle, altitude = _start(setup)
-    x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle))
+    drive = load_drive_tables(profile, rotor_speed=database.rotor_speed, nacelle=database.nacelle, nonlinear=nonlinear)
+    offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
+    held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
+    x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle, held))
     x[STATE.altitude] = altitude
     programme = setup.programme
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
@@ -215,7 +224,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         corridor=_corridor_tables(corridor, database),
         pilot=pilot,
         flaps=load_flap_tables(profile),
-        drive=load_drive_tables(profile, governed_speed=database.rotor_speed),
+        drive=drive,
         engine=load_engine_tables(profile, density=own.configuration.density),
         aids=design_aids(database),
         gusts=gust_tables(setup.air, profile),
@@ -236,6 +245,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         needed_aids=_needed_aids(setup, loaded),
         start_x=x,
         start_u=u,
+        start_held=offset,
     )
 
 
@@ -339,7 +349,9 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     )
     state.switches[AUTOMATIC_FLAPS], state.switches[GOVERNOR] = float(options.automatic_flaps), float(options.governor)
     state.flaps[FLAP_FOLLOWS], state.flaps[FLAP_SETTING] = 1.0, NO_SETTING
+    state.switches[AUTOMATIC_ROTOR_SPEED] = float(options.automatic_rotor_speed)
     state.drive[GOVERNED] = 1.0
+    state.drive[HELD_OFFSET] = state.drive[HELD_SETTING] = parts.start_held
     interpreted(law_start)(parts.tables.protection, state.protection)
     if options.aids:
         state.aids[MEMORY.last_switches] = -1.0  # engaged in the first frame, from the trim

@@ -34,7 +34,7 @@ from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import LAW
 from rtsim.protection.laws import load_laws
 from rtsim.systems.flap_kernels import FLAP_SETTING
-from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, trim_throttle
+from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, set_held_speed, trim_throttle
 
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
@@ -305,6 +305,18 @@ class Simulation:
             InputError: The share is out of range.
         """
         trim_throttle(self._state.drive, share)
+
+    def set_rotor_speed(self, speed: float) -> None:
+        """Give the governor another rotor speed to hold from this frame on; it no longer comes down by itself.
+
+        Args:
+            speed: Rotor speed [rad/s]: on the downstop down to that of airplane mode.
+
+        Raises:
+            InputError: The speed is out of range, or the nacelles do not stand on the downstop.
+        """
+        set_held_speed(self.tables.drive, self._state.drive, speed, float(self._state.nacelle[1]))
+        self.set_aid("automatic_rotor_speed", on=False)
 
     def set_fault(self, fault: Fault, on: bool) -> None:
         """Let a failure begin or end with this frame.

@@ -45,7 +45,7 @@ class Database:
     airspeed: FloatArray
     """Horizontal airspeed, signed (V,) [m/s], ascending."""
     nacelle: FloatArray
-    """Nacelle angle (N,) [rad], ascending; pi/2 helicopter."""
+    """Nacelle angle (N,) [rad], ascending; pi/2 helicopter. Rows below 0 are those of a lower rotor speed at 0."""
     x_ref: FloatArray
     """Trim state [..., nx]; altitude entry 0."""
     u_ref: FloatArray
@@ -68,8 +68,8 @@ class Database:
     """Whether a trim exists here [...]; where not, the cell holds the nearest valid airspeed's models."""
     flap: FloatArray
     """Flap deflection of the flap schedule (V, N) [rad]."""
-    rotor_speed: float
-    """Rotor speed, held [rad/s]."""
+    rotor_speed: FloatArray
+    """Rotor speed that is held in each nacelle row (N,) [rad/s]; below 0 it ascends to that of the others."""
     states: tuple[Variable, ...]
     """The nx states."""
     inputs: tuple[Variable, ...]
@@ -126,6 +126,11 @@ class Database:
         object.__setattr__(self, "_hash", content_hash)
 
     @property
+    def governed_speed(self) -> float:
+        """Rotor speed that is held off the downstop [rad/s]."""
+        return float(self.rotor_speed[-1])
+
+    @property
     def level_layer(self) -> int:
         """Number of the layer of zero acceleration."""
         return int(np.argmin(np.abs(self.layer_acceleration)))
@@ -150,9 +155,8 @@ class Database:
             for variable in kind:
                 digest.update(f"{variable.name}[{variable.unit}];".encode())
             digest.update(b"|")
-        for name in (*AXES, *GRIDDED, "flap"):
+        for name in (*AXES, *GRIDDED, "flap", "rotor_speed"):
             _update(digest, name, getattr(self, name))
-        _update(digest, "rotor_speed", np.array(self.rotor_speed))
         for design in sorted(self.pilot):
             for name in sorted(self.pilot[design].arrays):
                 _update(digest, f"pilot/{design}/{name}", self.pilot[design].arrays[name])
@@ -184,7 +188,7 @@ def _expected_shapes(database: Database) -> dict[str, tuple[int, ...]]:
         "x_ref": (nx,), "u_ref": (nu,), "y_ref": (ny,), "xdot_ref": (nx,), "df_dnacelle": (nx,), "valid": (),
         "A": (nx, nx), "B": (nx, nu), "C": (ny, nx), "D": (ny, nu),
     }  # fmt: skip
-    return {name: grid + tail for name, tail in tails.items()} | {"flap": grid[1:]}
+    return {name: grid + tail for name, tail in tails.items()} | {"flap": grid[1:], "rotor_speed": grid[2:]}
 
 
 def _check(database: Database) -> None:
@@ -214,8 +218,16 @@ def _check(database: Database) -> None:
                 value=float(array[where]),
                 mend="mark the cell invalid and fill it from the nearest airspeed that has a trim",
             )
-    if not np.isfinite(database.rotor_speed):
-        raise InputError("not a finite number", key="rotor_speed", value=database.rotor_speed)
+    slow = database.nacelle < 0.0
+    if np.any(database.rotor_speed[~slow] != database.governed_speed) or np.any(
+        np.diff(database.rotor_speed[slow]) < 0.0
+    ):
+        raise InputError(
+            "is not one speed off the downstop, to which the rows below nacelle 0 ascend",
+            key="rotor_speed",
+            value=database.rotor_speed.tolist(),
+            mend="give the rotor speed that is held in each nacelle row",
+        )
     if not database.valid[database.level_layer].any():
         raise InputError("no cell of the level layer is valid", key="valid")
 

@@ -60,11 +60,13 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
     """
     limits = load_limits(database.profile) if limits is None else limits
     level = database.level_layer
-    pitch = database.x_ref[level][..., required_position(database.states, "pitch", "the boundary")]
-    torque = database.y_ref[level][..., required_position(database.outputs, "torque", "the boundary")]
-    low, high = np.empty(database.nacelle.size), np.empty(database.nacelle.size)
-    for j, angle in enumerate(database.nacelle):
-        good = np.flatnonzero(database.valid[level, :, j])
+    rows = database.nacelle >= 0.0  # not those of a lower rotor speed
+    angles, valid = database.nacelle[rows], database.valid[level][:, rows]
+    pitch = database.x_ref[level][:, rows, required_position(database.states, "pitch", "the boundary")]
+    torque = database.y_ref[level][:, rows, required_position(database.outputs, "torque", "the boundary")]
+    low, high = np.empty(angles.size), np.empty(angles.size)
+    for j, angle in enumerate(angles):
+        good = np.flatnonzero(valid[:, j])
         speeds = database.airspeed[good]
         spare = MODEL_PITCH - pitch[good, j]
         bound = np.array([torque_limit(limits.torque, speed, angle) for speed in speeds])
@@ -73,15 +75,15 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
         high[j] = _crossing(speeds[middle:], (bound - torque[good, j])[middle:])
     published = load_corridor("design", database.profile)
     downstop = float(high[0])
-    off_stop = database.nacelle > published.downstop_nacelle + 1e-9
+    off_stop = angles > published.downstop_nacelle + 1e-9
     # On and just off the stop the trims are the same but for the flaps; the step stays at the downstop.
     high[~off_stop] = high[off_stop][0]
     return replace(
         published,
         name="model",
         title="Computed corridor (level trims: stall or attitude, mast torque)",
-        low=Boundary(database.nacelle, np.minimum.accumulate(low), "stall or attitude", _TRIMS),
-        high=Boundary(database.nacelle, np.minimum.accumulate(high), "mast torque or end of the trims", _TRIMS),
+        low=Boundary(angles, np.minimum.accumulate(low), "stall or attitude", _TRIMS),
+        high=Boundary(angles, np.minimum.accumulate(high), "mast torque or end of the trims", _TRIMS),
         downstop_speed=min(downstop, published.downstop_speed),
     )
 

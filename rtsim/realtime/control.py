@@ -28,6 +28,7 @@ Action = Literal[
     "flaps",
     "step-flaps",
     "throttle",
+    "rotor-speed",
     "disturb",
     "stop",
 ]
@@ -166,6 +167,14 @@ class FlightControl:
             share: Engine power to add, as a share of full power; one out of range is refused by an event.
         """
         self.requests.append(ControlRequest("throttle", number=share))
+
+    def set_rotor_speed(self, speed: float) -> None:
+        """Give the governor another rotor speed to hold.
+
+        Args:
+            speed: Rotor speed [rad/s]; one out of range, or off the downstop, is refused by an event.
+        """
+        self.requests.append(ControlRequest("rotor-speed", number=speed))
 
     def disturb(self, change: Disturbance) -> None:
         """Change the air, or let something fail or mend.

@@ -231,6 +231,8 @@ class Executive:
             source.step_flaps(int(request.number))
         elif action == "throttle":
             source.trim_throttle(request.number)
+        elif action == "rotor-speed":
+            source.set_rotor_speed(request.number)
         elif action == "disturb" and request.change is not None:
             source.disturb(request.change)
 

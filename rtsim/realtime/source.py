@@ -54,6 +54,14 @@ class SwitchedFlight(Protocol):
         """
         ...
 
+    def set_rotor_speed(self, speed: float) -> None:
+        """Give the governor another rotor speed to hold.
+
+        Args:
+            speed: Rotor speed [rad/s].
+        """
+        ...
+
 
 class FrameSource(SwitchedFlight, Protocol):
     """What is flown: a simulation with everything that acts on it."""

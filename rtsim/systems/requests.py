@@ -1,17 +1,19 @@
-"""What may be asked of flaps and throttle, checked and written into their states."""
+"""What may be asked of flaps, throttle and rotor speed, checked and written into their states."""
 
 from __future__ import annotations
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.systems.drive_kernels import THROTTLE_TRIM
+from rtsim.systems.drive_kernels import HELD_SETTING, LOCKED, THROTTLE_TRIM, DriveTables
 from rtsim.systems.flap_kernels import FLAP_SETTING, FlapTables, flap_now
-from rtsim.units import deg, to_deg
+from rtsim.units import deg, to_deg, to_rpm
 
 SAME_FLAP = deg(0.5)
 """Flaps closer than this to a setting are at it [rad]."""
 MOST_THROTTLE_TRIM = 0.5
 """Largest throttle trim, as a share of full power."""
+_SAME_SPEED = 5e-3
+"""A rotor speed this little beyond its range is at its end [rad/s]."""
 
 
 def check_flap_setting(tables: FlapTables, angle: float) -> None:
@@ -74,3 +76,44 @@ def trim_throttle(state: FloatArray, share: float) -> None:
             allowed=f"{-MOST_THROTTLE_TRIM:g} to {MOST_THROTTLE_TRIM:g} of full power",
         )
     state[THROTTLE_TRIM] = share
+
+
+def held_offset(tables: DriveTables, speed: float, nacelle: float) -> float:
+    """What a rotor speed to hold is less than the governed one [rad/s].
+
+    Args:
+        speed: Rotor speed to hold [rad/s].
+        nacelle: Nacelle angle [rad].
+
+    Raises:
+        InputError: The speed is out of range, or the nacelles do not stand on the downstop.
+    """
+    offset = speed - tables.governed_speed
+    low, high = to_rpm(tables.governed_speed + tables.slow_offset), to_rpm(tables.governed_speed)
+    if not tables.slow_offset - _SAME_SPEED <= offset <= _SAME_SPEED:
+        allowed = f"{low:.4g} to {high:.4g} rpm" if tables.slow_offset else f"{high:.4g} rpm: the database has no other"
+        raise InputError("is out of range", key="rotor_rpm", value=f"{to_rpm(speed):.6g} rpm", allowed=allowed)
+    offset = min(max(offset, tables.slow_offset), 0.0)
+    if offset < 0.0 and nacelle > LOCKED:
+        raise InputError(
+            "needs the nacelles on the downstop",
+            key="rotor_rpm",
+            value=f"{to_rpm(speed):.6g} rpm at nacelle {to_deg(nacelle):.4g} deg",
+            allowed=f"{high:.4g} rpm off it",
+            mend="move the nacelles to 0 deg first",
+        )
+    return offset
+
+
+def set_held_speed(tables: DriveTables, state: FloatArray, speed: float, nacelle: float) -> None:
+    """Give a rotor speed to hold.
+
+    Args:
+        state: Drive state; changed in place.
+        speed: Rotor speed to hold [rad/s].
+        nacelle: Nacelle angle [rad].
+
+    Raises:
+        InputError: The speed is out of range, or the nacelles do not stand on the downstop.
+    """
+    state[HELD_SETTING] = held_offset(tables, speed, nacelle)

@@ -201,7 +201,7 @@ class Hands:
             self._waiting = False
             if request.name != flight.simulation.mode or (request.name == "external" and not flight.by_hand):
                 flight.switch_pilot(request.name, by_hand=True)
-        elif kind in {"aid", "flaps", "throttle"}:
+        elif kind in {"aid", "flaps", "throttle", "rotor_speed"}:
             _switch(request, flight)
         elif kind == "parameter":
             self._settings = self._settings.with_parameter(request.name, request.value)
@@ -248,9 +248,11 @@ def _flies(flight: HandedFlight) -> bool:
 
 
 def _switch(request: Request, flight: HandedFlight) -> None:
-    """Serve a request for an aid, the flaps or the throttle."""
+    """Serve a request for an aid, the flaps, the throttle or the rotor speed."""
     if request.kind == "throttle":
         flight.trim_throttle(request.value)
+    elif request.kind == "rotor_speed":
+        flight.set_rotor_speed(request.value)
     elif request.kind == "flaps":
         steps = {"up": -1, "down": 1}
         if request.name in steps:

@@ -17,7 +17,7 @@ from rtsim.sticks.settings import StickSettings
 from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
 from telemetry.mavlink.config import HomePosition, MavlinkConfig, Ratings, endpoints
-from telemetry.mavlink.parameters import ParameterStore
+from telemetry.mavlink.parameters import NOT_STORED, ParameterStore
 
 if TYPE_CHECKING:
     from scenarios.files.scenario import Scenario
@@ -74,7 +74,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
     if parameter_file is None:
         homeless = "There is no home folder to keep MAVLink parameters in; --mavlink-parameters FILE names a place."
         warning = f"{warning} {homeless}" if warning else homeless
-    always = {"automatic_flaps": scenario.options.automatic_flaps, "governor": scenario.options.governor}
+    always = {name: getattr(scenario.options, name) for name in NOT_STORED}
     aids_on = {*scenario.options.aids, *(name for name, on in always.items() if on)}
     config = MavlinkConfig(
         targets=targets,
@@ -110,7 +110,7 @@ def _ratings(database: str) -> Ratings:
         hover_torque_inlb=torque.takeoff / INCH_POUND,
         hover_nacelle_deg=to_deg(torque.takeoff_nacelle),
         hover_airspeed_kt=to_kt(torque.takeoff_airspeed),
-        rotor_speed_rpm=to_rpm(aircraft.rotor_speed) if aircraft.rotor_speed > 0.0 else Ratings().rotor_speed_rpm,
+        rotor_speed_rpm=to_rpm(aircraft.governed_speed) if aircraft.governed_speed > 0.0 else Ratings().rotor_speed_rpm,
     )
 
 

@@ -26,7 +26,7 @@ from scenarios.flight.flight_setup import setup_from_json
 from telemetry.log.format import EVENTS_FILE, LogEvent
 from telemetry.log.reader import FlightLog, read_log
 
-ACTING_KINDS = frozenset({"reset", "pilot", "aid", "flaps", "throttle", "law", "override"})
+ACTING_KINDS = frozenset({"reset", "pilot", "aid", "flaps", "throttle", "rotor_speed", "law", "override"})
 """Events besides those of the air and of failures that a replay repeats."""
 
 
@@ -204,6 +204,9 @@ def _understood(kind: str, data: Mapping[str, Any]) -> Callable[[Simulation], No
     if kind == "throttle":
         share = _number(data["share"])
         return lambda simulation: simulation.set_throttle_trim(share)
+    if kind == "rotor_speed":
+        speed = _number(data["speed"])
+        return lambda simulation: simulation.set_rotor_speed(speed)
     if kind == "override":
         active = bool(data["on"])
         return lambda simulation: simulation.set_protection_override(active)

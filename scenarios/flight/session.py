@@ -19,7 +19,7 @@ from rtsim.guests import GuestError, visited
 from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
 from rtsim.protection.chain import LawEvent
-from rtsim.units import to_deg
+from rtsim.units import to_deg, to_rpm
 from scenarios.files.disturbances import disturbance_event
 from scenarios.files.nacelle_laws import NacelleLawFactory, NacelleLawGuard
 from scenarios.files.scenario import ScenarioEvent
@@ -269,6 +269,15 @@ class FlightSession:
         """
         if self._done(lambda: self.simulation.set_throttle_trim(share)):
             self._tell("throttle", f"throttle trimmed to {100.0 * share:+.0f} % of full power", {"share": share})
+
+    def set_rotor_speed(self, speed: float) -> None:
+        """Give the governor another rotor speed to hold; what cannot be done is told and changes nothing.
+
+        Args:
+            speed: Rotor speed [rad/s].
+        """
+        if self._done(lambda: self.simulation.set_rotor_speed(speed)):
+            self._tell("rotor_speed", f"rotor speed to {to_rpm(speed):.0f} rpm", {"speed": speed})
 
     def override_protection(self) -> None:
         """Take the authority from the protection law from the coming frame on, or give it back."""

@@ -39,7 +39,7 @@ class Parameter:
 
 
 RESET, NACELLE_COMMAND, PILOT, ARM_NEUTRAL = "XV_RESET", "XV_NAC_CMD", "XV_PILOT", "XV_ARM_NEUTRAL"
-FLAP_COMMAND, THROTTLE_TRIM = "XV_FLAP_CMD", "XV_THR_TRIM"
+FLAP_COMMAND, THROTTLE_TRIM, ROTOR_SPEED = "XV_FLAP_CMD", "XV_THR_TRIM", "XV_ROTOR_RPM"
 LOSS_TIME, OWNER_TIME, LEVER_RANGE, WARNINGS = "XV_MC_LOSS_T", "XV_OWNER_T", "XV_Z_BIPOLAR", "XV_WARN"
 
 AID_PARAMETERS: dict[str, tuple[str, str]] = {
@@ -49,10 +49,11 @@ AID_PARAMETERS: dict[str, tuple[str, str]] = {
     "airspeed_hold": ("XV_SPD_HOLD", "Airspeed hold: 1 on, 0 off."),
     "trim_bias": ("XV_TRIM_BIAS", "Bias schedule that keeps the trimmed stick near its centre: 1 on, 0 off."),
     "automatic_flaps": ("XV_AUTO_FLAP", "Flaps move by themselves with airspeed and nacelle angle: 1 on, 0 off."),
+    "automatic_rotor_speed": ("XV_AUTO_RPM", "Rotors slow down by themselves on the downstop: 1 on, 0 off."),
     "governor": ("XV_GOVERNOR", "Rotor-speed governor: 1 on; 0 off: the lever is throttle and collective."),
 }
 """Parameter name and description of every pilot aid there may be; a vehicle has those its flight has."""
-NOT_STORED = frozenset({"automatic_flaps", "governor"})
+NOT_STORED = frozenset({"automatic_flaps", "automatic_rotor_speed", "governor"})
 """Switches of the aircraft, not habits of a pilot: no flight should begin without them because of an old file."""
 
 PARAMETERS: tuple[Parameter, ...] = (
@@ -61,6 +62,7 @@ PARAMETERS: tuple[Parameter, ...] = (
     Parameter(NACELLE_COMMAND, 90, 0, 90, "deg", "Nacelle angle to go to, 90 helicopter, 0 airplane.", stored=False),
     Parameter(FLAP_COMMAND, 40, 0, 75, "deg", "Flap setting to go to; switches automatic flaps off.", stored=False),
     Parameter(THROTTLE_TRIM, 0, -50, 50, "%", "Engine power added while the governor is off.", stored=False),
+    Parameter(ROTOR_SPEED, 589, 100, 5000, "rpm", "Rotor speed to hold, lower on the downstop only.", stored=False),
     Parameter("XV_NAC_MODE", 0, 0, 1, "", "Nacelle switch: 0 moves while held, 1 runs to detents.", choices=True),
     Parameter("XV_NAC_RATE", 7.5, 0.5, 7.5, "deg/s", "Nacelle rate of switch and commands."),
     Parameter(LOSS_TIME, 0.5, 0.2, 10, "s", "Sticks count as lost after this time without input."),

@@ -14,11 +14,19 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import all as dialect
 
-from rtsim.units import deg
+from rtsim.units import deg, rpm
 from telemetry.mavlink.exchange import Request
 from telemetry.mavlink.framing import Frame
 from telemetry.mavlink.outbox import Outbox
-from telemetry.mavlink.parameters import AID_PARAMETERS, FLAP_COMMAND, NACELLE_COMMAND, PILOT, RESET, THROTTLE_TRIM
+from telemetry.mavlink.parameters import (
+    AID_PARAMETERS,
+    FLAP_COMMAND,
+    NACELLE_COMMAND,
+    PILOT,
+    RESET,
+    ROTOR_SPEED,
+    THROTTLE_TRIM,
+)
 from telemetry.mavlink.peers import Peer
 from telemetry.mavlink.state import PILOT_EXTERNAL, PILOT_HOLD, PILOT_MOCM
 
@@ -191,6 +199,9 @@ class Services:
             return
         if name == THROTTLE_TRIM:
             outbox.request(Request("throttle", "", value / 100.0))
+            return
+        if name == ROTOR_SPEED:
+            outbox.request(Request("rotor_speed", "", rpm(value)))
             return
         for aid, (parameter, _) in AID_PARAMETERS.items():
             if parameter == name:

@@ -33,6 +33,7 @@ from telemetry.mavlink.parameters import (
     FLAP_COMMAND,
     NACELLE_COMMAND,
     OWNER_TIME,
+    ROTOR_SPEED,
     THROTTLE_TRIM,
     WARNINGS,
     ParameterStore,
@@ -223,6 +224,7 @@ class Vehicle(Outbox):
                     NACELLE_COMMAND: min(max(round(self.state.value("nacelle_deg"), 1), 0.0), 90.0),
                     FLAP_COMMAND: min(max(round(self.state.value("flap_deg"), 1), 0.0), 75.0),
                     THROTTLE_TRIM: 0.0,
+                    ROTOR_SPEED: round(self.state.value("rotor_speed_rpm"), 1),
                 }
             )
 

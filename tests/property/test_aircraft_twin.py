@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import CubicHermiteSpline, NdBSpline
 
 from rtsim.aircraft.points import Condition
-from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, STATE, STATES
+from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, SCHEDULING_SPEED, STATE, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15 import rotor_kernels
 from rtsim.aircraft.xv15.model import Xv15
@@ -63,19 +63,18 @@ class Disc:
 
 
 def section_coefficients(rotor, alpha, mach):
-    angles = rotor.section_start + rotor.section_step * np.arange(rotor.section.shape[1])
-    lift, drag = np.empty_like(alpha), np.empty_like(alpha)
+    """Quadratic B-splines in angle of attack and Mach number, by scipy."""
+    tables = rotor.section
+    found = np.empty((2, *alpha.shape))
+    position = [
+        (alpha - rotor.section_start) / rotor.section_step,
+        np.minimum((mach - rotor.mach_start) / rotor.mach_step, tables.shape[2] - 2.0),
+    ]
+    knots = [np.arange(n + 3) - 1.5 for n in tables.shape[1:3]]
     for i in range(alpha.shape[1]):
-        nodes = rotor.section[i]
-        lift[:, i] = CubicHermiteSpline(angles, nodes[:, 0], nodes[:, 1] / rotor.section_step)(alpha[:, i])
-        drag[:, i] = CubicHermiteSpline(angles, nodes[:, 2], nodes[:, 3] / rotor.section_step)(alpha[:, i])
-    mach = np.minimum(mach, 0.9)
-    lift = lift * rotor.reference_glauert / np.sqrt(1.0 - mach**2)
-    critical = rotor.drag_divergence - 0.1 * np.abs(lift) - (0.1 / 80.0) ** (1.0 / 3.0)
-    # The kernel carries the rounded Korn constant.
-    critical += (0.1 / 80.0) ** (1.0 / 3.0) - 0.1077
-    rise = 20.0 * np.maximum(mach - critical, 0.0) ** 4 - 20.0 * np.maximum(rotor.reference_mach - critical, 0.0) ** 4
-    return lift, np.maximum(drag + rotor.root_drag + rise, 0.003)
+        spline = NdBSpline(tuple(knots), tables[i], k=2)
+        found[..., i] = np.moveaxis(spline(np.column_stack([p[:, i] for p in position])), -1, 0)
+    return found[0], found[1] + rotor.root_drag
 
 
 def rotor_twin(rotor, air, hub, flapping, inflow, pitch):
@@ -156,27 +155,37 @@ def wing_twin(wing, air, flow, setting, wake, arms):
     return load + np.array([*force, arms[1][1] * force[0] - arms[1][0] * force[1]])
 
 
-def body_twin(body, air, flow, nacelle, induced, arms):
+def fuselage_twin(body, air, flow, arm):
     speed = np.hypot(*flow)
     pressure = 0.5 * air.density * speed**2
     alpha = np.arctan2(flow[1], flow[0])
     angle = folded(alpha)
     lift = curve(body.fuselage, 0, angle) if abs(alpha) <= ANGLE else 0.0
-    load = resolve(
-        pressure * lift,
-        pressure * curve(body.fuselage, 1, angle),
-        flow,
-        arms[0],
-        pressure * curve(body.fuselage, 2, angle),
-    )
-    pylon = 0.5 * air.density * induced * abs(induced) * curve(body.pylon_area, 0, nacelle)
-    force = pylon * np.array([-np.cos(nacelle), np.sin(nacelle)])
-    load += np.array([*force, arms[1][1] * force[0] - arms[1][0] * force[1]])
+    drag, moment = curve(body.fuselage, 1, angle), curve(body.fuselage, 2, angle)
+    return resolve(pressure * lift, pressure * drag, flow, arm, pressure * moment)
+
+
+def drag_twin(area, air, flow, arm):
+    return resolve(0.0, 0.5 * air.density * area * np.hypot(*flow) ** 2, flow, arm, 0.0)
+
+
+def small_parts_twin(tables, air, motion, nacelle, rotor_state, arms):
+    """Spinners, pylons, jets and fins."""
+    body = tables.body
+    (ua, wa, qa), (hub_velocity, induced, power) = motion, rotor_state
+    hub, pivot, fins = arms
     mast = np.array([np.cos(nacelle), -np.sin(nacelle)])
-    cosine = np.dot(mast, flow) / max(speed, 1e-9)
-    sine = np.sqrt(max(1.0 - cosine**2, 0.0)) if speed > 0.0 else 0.0
-    load += resolve(0.0, pressure * (body.spinner_area + body.spinner_incidence_area * sine**3), flow, arms[1], 0.0)
-    return load + resolve(0.0, pressure * body.fin_area, flow, arms[2], 0.0)
+    at_hub = hub_velocity + induced * mast
+    sine = np.sin(np.arccos(np.clip(at_hub @ mast / max(np.hypot(*at_hub), 1e-9), -1.0, 1.0)))
+    load = drag_twin(body.spinner_area + body.spinner_incidence_area * sine**3, air, at_hub, hub)
+    incidence = abs(nacelle + np.arctan2(wa, np.hypot(ua, SCHEDULING_SPEED)))
+    area = curve(body.pylon_area, 0, nacelle) * curve(body.pylon_incidence_factor, 0, incidence)
+    at_pivot = np.array([ua + qa * pivot[1], wa - qa * pivot[0]])
+    load = load + drag_twin(area, air, at_pivot + tables.wing.immersed_velocity_factor * induced * mast, pivot)
+    thrust = max(body.jet_static + body.jet_per_power * power, 0.0) - body.jet_ram * np.hypot(ua, wa)
+    force = thrust * mast
+    load = load + np.array([*force, pivot[1] * force[0] - pivot[0] * force[1]])
+    return load + drag_twin(body.fin_area, air, (ua, wa), fins)
 
 
 def between(nodes, nacelle):
@@ -222,10 +231,9 @@ def inflow_twin(rotor, air, hub, inflow, loads):
     flow = max((mu**2 + axial * (axial + ideal)) / resultant, 0.02)
     cosine = abs(axial) / resultant
     gain = 4.0 / ((1.0 + cosine) * flow)
+    gradient = rotor.skew_gradient * (1.0 - np.exp(-((mu / rotor.skew_gradient_onset) ** 2)))
     moments = rotor.blades / 2.0 * loads[4:6] / (scale * rotor.radius)
-    target = np.array(
-        [gain * cosine * moments[0] + rotor.skew_gradient * mu / resultant * inflow[0], gain * moments[1]]
-    )
+    target = np.array([gain * cosine * moments[0] + gradient * mu / resultant * inflow[0], gain * moments[1]])
     mean = om / rotor.apparent_mass * (loads[0] / scale - 2.0 * ideal * resultant)
     return np.array([mean, *(om / (rotor.gradient_apparent_mass * gain) * (target - np.array(inflow[1:])))])
 
@@ -302,8 +310,10 @@ def derivative_twin(tables, x, u, nacelle):
         (induced, hub_motion[1]),
         (arm(tables.wing.position), arm(tables.wing.immersed_position)),
     )
-    total = total + body_twin(
-        tables.body, air, (ua, wa), nacelle, induced, (arm(tables.body.position), pivot, tail_arm)
+    total = total + fuselage_twin(tables.body, air, (ua, wa), arm(tables.body.position))
+    power = 2.0 * loads[2] * air.rotor_speed
+    total = total + small_parts_twin(
+        tables, air, (ua, wa, qa), nacelle, (velocity, induced, power), (hub, pivot, tail_arm)
     )
     total = total + tail_twin(tables.tail, air, (ua, wa, qa), (nacelle, flap, state["elevator"]), induced, tail_arm)
     inertia = mass.pitch_inertia_airplane + mass.pitch_inertia_slope * nacelle

@@ -207,9 +207,9 @@ def test_angle_function_is_the_arctangent():
 def test_section_tables_go_once_round_the_circle():
     """Lift and drag at -180 and +180 deg agree, so a wrapped angle meets no step; drag is positive everywhere."""
     section = ROTOR.section
-    np.testing.assert_allclose(section[:, 0, [0, 2]], section[:, -1, [0, 2]], atol=1e-12)
+    np.testing.assert_allclose(section[:, :3], section[:, -3:], atol=1e-12)
     assert np.all(np.isfinite(section))
-    assert section[:, :, 2].min() > 0.0
+    assert section[..., 1].min() >= 0.005  # the smallest that is printed
 
 
 def test_reversed_rising_flow_stays_in_the_tables():

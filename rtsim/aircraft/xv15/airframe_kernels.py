@@ -1,4 +1,4 @@
-"""Wing, fuselage, pylons and fins: forces [N] along body x and z, pitching moment [N m] about the centre of gravity.
+"""Wing, fuselage, pylons, spinners, jets and fins: force along body x and z [N], moment about the centre of gravity.
 
 Legend:
     wing: The tables.
@@ -165,40 +165,96 @@ def wing_load(
 
 
 @inner_kernel
-def body_load(
-    body: BodyTables,
-    air: Configuration,
-    flow: tuple[float, float],
-    nacelle: float,
-    induced: float,
-    arms: tuple[tuple[float, float], tuple[float, float], tuple[float, float]],
-) -> Load:
-    """Fuselage, pylons in the rotor wake, spinners and fins.
+def fuselage_load(body: BodyTables, air: Configuration, flow: tuple[float, float], arm: tuple[float, float]) -> Load:
+    """Fuselage.
 
     Args:
         body: The tables.
         air: Density.
         flow: u, w [m/s].
-        induced: Mean induced velocity of the rotors [m/s].
-        arms: Arms of the fuselage reference point, the nacelle pivot and the fins [m].
+        arm: Arm of the reference point [m].
     """
     u, w = flow
-    speed = math.sqrt(u * u + w * w)
-    pressure = 0.5 * air.density * speed * speed
+    pressure = 0.5 * air.density * (u * u + w * w)
     alpha = math.atan2(w, u)
     folded = fold(alpha)
     lift = pressure * curve(body.fuselage, 0, folded)
     if abs(alpha) > 0.5 * math.pi:
         lift = 0.0
     drag = pressure * curve(body.fuselage, 1, folded)
-    x, z, moment = wind_to_body(lift, drag, u, w, arms[0], pressure * curve(body.fuselage, 2, folded))
-    pylon = 0.5 * air.density * induced * abs(induced) * curve(body.pylon_area, 0, nacelle)
-    x_pylon = -pylon * math.cos(nacelle)
-    z_pylon = pylon * math.sin(nacelle)
-    # Incidence of the mast to the flow: 0 when the flow comes along the mast.
-    sin_incidence = abs(u * math.sin(nacelle) + w * math.cos(nacelle)) / max(speed, 1e-9)
-    spinner = pressure * (body.spinner_area + body.spinner_incidence_area * sin_incidence**3)
-    xs, zs, ms = wind_to_body(0.0, spinner, u, w, arms[1], 0.0)
-    xf, zf, mf = wind_to_body(0.0, pressure * body.fin_area, u, w, arms[2], 0.0)
-    moment += arms[1][1] * x_pylon - arms[1][0] * z_pylon + ms + mf
-    return x + x_pylon + xs + xf, z + z_pylon + zs + zf, moment
+    return wind_to_body(lift, drag, u, w, arm, pressure * curve(body.fuselage, 2, folded))
+
+
+@inner_kernel
+def drag_load(area: float, air: Configuration, flow: tuple[float, float], arm: tuple[float, float]) -> Load:
+    """What only resists: its drag along the flow.
+
+    Args:
+        area: Drag area [m^2].
+        air: Density.
+        flow: Flow at the place, along body x and z [m/s].
+        arm: Arm of the place [m].
+    """
+    u, w = flow
+    pull = -0.5 * air.density * area * math.sqrt(u * u + w * w)
+    x, z = pull * u, pull * w
+    return x, z, arm[1] * x - arm[0] * z
+
+
+@inner_kernel
+def pylon_load(
+    body: BodyTables,
+    air: Configuration,
+    flow: tuple[float, float],
+    nacelle: float,
+    incidence: float,
+    wake: float,
+    arm: tuple[float, float],
+) -> Load:
+    """Pylons in the whole flow about them: free stream and rotor wake (NASA CR-166536 table 4-XV).
+
+    Args:
+        body: The tables.
+        air: Density.
+        flow: Flow at the pivot without the wake, along body x and z [m/s].
+        incidence: Angle between mast and free stream [rad].
+        wake: Velocity of the wake, down the mast [m/s].
+        arm: Arm of the pivot [m].
+    """
+    area = curve(body.pylon_area, 0, nacelle) * curve(body.pylon_incidence_factor, 0, incidence)
+    return drag_load(area, air, (flow[0] + wake * math.cos(nacelle), flow[1] - wake * math.sin(nacelle)), arm)
+
+
+@inner_kernel
+def spinner_load(
+    body: BodyTables, air: Configuration, hub: tuple[float, float], nacelle: float, arm: tuple[float, float]
+) -> Load:
+    """Spinners and hubs, in the flow at the hub.
+
+    Args:
+        body: The tables.
+        air: Density.
+        hub: Flow in the disc plane towards the nose, and along the mast with the induced velocity [m/s].
+        arm: Arm of the hub [m].
+    """
+    across, along = hub
+    # Sine of the angle between mast and flow.
+    sine = abs(across) / max(math.sqrt(across * across + along * along), 1e-9)
+    area = body.spinner_area + body.spinner_incidence_area * sine**3
+    s, c = math.sin(nacelle), math.cos(nacelle)
+    return drag_load(area, air, (across * s + along * c, across * c - along * s), arm)
+
+
+@inner_kernel
+def jet_load(body: BodyTables, power: float, airspeed: float, nacelle: float, arm: tuple[float, float]) -> Load:
+    """Thrust of the engines' exhaust less the drag of the air they take in, along the mast at the pivot.
+
+    Args:
+        body: The law's constants.
+        power: Shaft power of both rotors [W].
+        airspeed: Airspeed [m/s].
+        arm: Arm of the pivot [m].
+    """
+    thrust = max(body.jet_static + body.jet_per_power * power, 0.0) - body.jet_ram * airspeed
+    x, z = thrust * math.cos(nacelle), -thrust * math.sin(nacelle)
+    return x, z, arm[1] * x - arm[0] * z

@@ -28,7 +28,7 @@ from rtsim.aircraft.xv15.tables import (
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.toml_file import shipped_toml
-from rtsim.units import FOOT, INCH, KNOT, POUND, SLUG, SLUG_FOOT_SQUARED, deg, rpm
+from rtsim.units import FOOT, HORSEPOWER, INCH, KNOT, POUND, POUND_FORCE, SLUG, SLUG_FOOT_SQUARED, deg, rpm
 
 Data = dict[str, Any]
 
@@ -132,13 +132,28 @@ def _body(data: Data, choices: Data) -> BodyTables:
         pylon_area=_against_nacelle(
             interference["pylon_interf_betam_deg"], [[v * FOOT**2 for v in interference["pylon_interf_D_ft2"]]]
         ),
+        pylon_incidence_factor=smooth_curves(
+            [[deg(a) for a in interference["K_PLAT_mast_incidence_deg"]]],
+            [interference["K_PLAT"] if choices["drag"]["pylon_k_plat"] else [1.0] * len(interference["K_PLAT"])],
+            np.radians(np.arange(0.0, 90.5, 1.0)),
+        ),
         spinner_area=2.0 * 1.0 * FOOT**2,
         spinner_incidence_area=2.0 * 5.5 * FOOT**2,
         fin_area=choices["drag"]["vtail_drag_ft2"] * FOOT**2,
+        **_jet(data["jet_thrust"], on=choices["drag"]["jet_thrust"]),
     )
 
 
-def _tail(data: Data) -> TailTables:
+def _jet(printed: Data, *, on: bool) -> dict[str, float]:
+    """The plane through the printed jet thrusts over power and airspeed (least squares)."""
+    power = np.array(printed["rotor_power_shp"]) * HORSEPOWER
+    airspeed = np.array(printed["airspeed_kt"]) * KNOT
+    terms = np.column_stack([np.ones_like(power), power, -airspeed])
+    found = np.linalg.lstsq(terms, np.array(printed["up_lb"]) * POUND_FORCE, rcond=None)[0] * on
+    return dict(zip(("jet_static", "jet_per_power", "jet_ram"), found.tolist(), strict=True))
+
+
+def _tail(data: Data, choices: Data) -> TailTables:
     tail, downwash, wake = data["htail"], data["downwash"], data["rotor_wake_at_tail"]
     elevator_grid = np.radians(np.arange(-20.0, 20.1, 2.5))
     lift = smooth_surface(
@@ -188,7 +203,7 @@ def _tail(data: Data) -> TailTables:
         downwash=smooth_curves([downwash_alpha] * len(rows), rows, ALPHA_GRID),
         downwash_nacelle=np.radians([90.0 - b for b in mast]),
         pressure_ratio=stack_surfaces(ratio, alpha_grid, speed_grid),
-        rotor_wake=stack_surfaces(wakes, alpha_grid, speed_grid),
+        rotor_wake=stack_surfaces([table * choices["tail"]["rotor_wake"] for table in wakes], alpha_grid, speed_grid),
         wake_nacelle=np.radians([90.0, 75.0, 60.0, 30.0]),
     )
 
@@ -277,7 +292,7 @@ def load_tables(changes: Mapping[str, Any] | None = None) -> AircraftTables:
         rotor=read_rotor(data, choices),
         wing=_wing(data, choices),
         body=_body(data, choices),
-        tail=_tail(data),
+        tail=_tail(data, choices),
         controls=_controls(data, choices),
         mass=_mass(data, choices),
     )

@@ -6,7 +6,16 @@ import math
 
 from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
-from rtsim.aircraft.xv15.airframe_kernels import body_load, moment_arm, wing_angle_of_attack, wing_load
+from rtsim.aircraft.xv15.airframe_kernels import (
+    drag_load,
+    fuselage_load,
+    jet_load,
+    moment_arm,
+    pylon_load,
+    spinner_load,
+    wing_angle_of_attack,
+    wing_load,
+)
 from rtsim.aircraft.xv15.rotor_kernels import (
     FLOW_COUNT,
     FORWARD_FORCE,
@@ -27,8 +36,9 @@ from rtsim.units import GRAVITY
 WORK_WING_ALPHA = LOAD_COUNT
 WORK_FORCE_Z = LOAD_COUNT + 1
 COMPONENT = LOAD_COUNT + 2
-"""Loads X, Z, M of rotors, wing, body, tail follow from here in the work array."""
-FLOW = COMPONENT + 12
+"""Loads X, Z, M of the COMPONENTS follow from here in the work array."""
+COMPONENTS = ("rotors", "spinners", "wing", "fuselage", "pylons", "jets", "fins", "tail")
+FLOW = COMPONENT + 3 * len(COMPONENTS)
 """The blade sections' flow and forces follow from here in the work array."""
 MOST_STATIONS = 64
 WORK_COUNT = FLOW + FLOW_COUNT * MOST_STATIONS
@@ -167,19 +177,35 @@ def derivative(
         ),
     )
     tail_arm = moment_arm((tail.position[0], tail.position[1]), centre)
-    body_x, body_z, body_m = body_load(
-        body,
-        air,
-        (ua, wa),
-        nacelle,
-        induced,
-        (moment_arm((body.position[0], body.position[1]), centre), pivot, tail_arm),
+    # At rest the free stream has no direction; there it counts as coming from ahead.
+    incidence = abs(nacelle + math.atan2(wa, math.sqrt(ua * ua + SCHEDULING_SPEED * SCHEDULING_SPEED)))
+    loads = (
+        (rotor_x, rotor_z, rotor_m),
+        spinner_load(body, air, (hub[0], hub[1] + induced), nacelle, (hub_x, hub_z)),
+        (wing_x, wing_z, wing_m),
+        fuselage_load(body, air, (ua, wa), moment_arm((body.position[0], body.position[1]), centre)),
+        pylon_load(
+            body,
+            air,
+            (ua + qa * pivot[1], wa - qa * pivot[0]),
+            nacelle,
+            incidence,
+            wing.immersed_velocity_factor * induced,
+            pivot,
+        ),
+        jet_load(body, 2.0 * work[TORQUE] * air.rotor_speed, speed, nacelle, pivot),
+        drag_load(body.fin_area, air, (ua, wa), tail_arm),
+        tail_load(tail, air, (ua, wa, qa), (nacelle, flap, x[STATE.elevator]), induced, tail_arm),
     )
-    tail_x, tail_z, tail_m = tail_load(tail, air, (ua, wa, qa), (nacelle, flap, x[STATE.elevator]), induced, tail_arm)
-    force_x = rotor_x + wing_x + body_x + tail_x
-    force_z = rotor_z + wing_z + body_z + tail_z
+    force_x, force_z, moment = 0.0, 0.0, 0.0
+    for i in range(len(loads)):
+        load = loads[i]
+        force_x += load[0]
+        force_z += load[1]
+        moment += load[2]
+        for axis in range(3):
+            work[COMPONENT + 3 * i + axis] = load[axis]
     inertia = mass.pitch_inertia_airplane + mass.pitch_inertia_slope * nacelle
-    moment = rotor_m + wing_m + body_m + tail_m
     moment -= mass.nacelle_inertia * nacelle_acceleration + mass.pitch_inertia_slope * nacelle_rate * q
 
     pitch = x[STATE.pitch]
@@ -211,10 +237,6 @@ def derivative(
 
     work[WORK_WING_ALPHA] = wing_alpha
     work[WORK_FORCE_Z] = force_z
-    work[COMPONENT + 0], work[COMPONENT + 1], work[COMPONENT + 2] = rotor_x, rotor_z, rotor_m
-    work[COMPONENT + 3], work[COMPONENT + 4], work[COMPONENT + 5] = wing_x, wing_z, wing_m
-    work[COMPONENT + 6], work[COMPONENT + 7], work[COMPONENT + 8] = body_x, body_z, body_m
-    work[COMPONENT + 9], work[COMPONENT + 10], work[COMPONENT + 11] = tail_x, tail_z, tail_m
 
 
 @inner_kernel

@@ -18,6 +18,7 @@ from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import packed
+from rtsim.units import rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +59,13 @@ class Xv15:
         )
         return Xv15(self.tables._replace(configuration=configuration))
 
+    @property
+    def airplane_rotor_speed(self) -> float:
+        """Rotor speed of airplane mode [rad/s]."""
+        from rtsim.aircraft.xv15.data_reader import read_data
+
+        return float(rpm(read_data()[0]["rotor"]["rpm_airplane"]))
+
     def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
         """State derivative.
 
@@ -79,10 +87,7 @@ class Xv15:
         """Force along body x and z [N] and moment about the centre of gravity [N m] of each component."""
         self.derivative(x, u, nacelle_angle)
         start = kernels.COMPONENT
-        return {
-            name: self._work[start + 3 * i : start + 3 * i + 3].copy()
-            for i, name in enumerate(("rotors", "wing", "body", "tail"))
-        }
+        return {name: self._work[start + 3 * i : start + 3 * i + 3].copy() for i, name in enumerate(kernels.COMPONENTS)}
 
     def trim(self, condition: Condition, guess: TrimPoint | None = None) -> TrimPoint:
         """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.

@@ -38,7 +38,8 @@ THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT = 0, 1,
 LOAD_COUNT = 6
 # Rows of the scratch array of one blade position; LIFT and DRAG become the normal and the in-plane force.
 ALPHA, SPEED, UT, UP, LIFT, DRAG = 0, 1, 2, 3, 4, 5
-FLOW_COUNT = 6
+ANGLE_PART, MACH_PART, CELL, NODES = 6, 7, 8, 9
+FLOW_COUNT = NODES + 6
 
 
 @inner_kernel
@@ -95,57 +96,61 @@ def _section_flow(
 
 
 @inner_kernel
-def _section_tables(rotor: RotorTables, flow: FloatArray) -> None:
-    """Look up lift and drag coefficient of every station before compressibility.
+def _section_tables(rotor: RotorTables, air: Configuration, flow: FloatArray) -> None:
+    """Look up lift and drag coefficient of every station over angle of attack and Mach number.
 
-    Lift and drag share one grid over the whole circle: one cell and one Hermite basis serve both.
+    Quadratic B-splines in both: smooth, and linear where the nodes are. The outermost nodes lie outside what is asked.
 
     Args:
-        flow: Row ALPHA is read; written: rows LIFT, DRAG.
+        air: Speed of sound.
+        flow: Rows ALPHA and SPEED are read; written: rows LIFT, DRAG.
     """
-    data = rotor.section
-    last = data.shape[1] - 2
+    nodes = rotor.section.reshape(-1)
+    machs = rotor.section.shape[2]
+    angles = rotor.section.shape[1] * 1.0
+    per_angle = 1.0 / rotor.section_step
+    per_speed = 1.0 / (air.sound_speed * rotor.mach_step)
+    first_mach = rotor.mach_start / rotor.mach_step
+    # Three loops: the first and the last become vector instructions, the one between only loads and adds.
     for i in range(rotor.stations.shape[0]):
-        position = (flow[ALPHA, i] - rotor.section_start) / rotor.section_step
-        k = min(max(int(position), 0), last)
-        t = position - k
-        t2 = t * t
-        t3 = t2 * t
-        h01 = 3.0 * t2 - 2.0 * t3
-        h00 = 1.0 - h01
-        h10 = t3 - 2.0 * t2 + t
-        h11 = t3 - t2
-        flow[LIFT, i] = h00 * data[i, k, 0] + h10 * data[i, k, 1] + h01 * data[i, k + 1, 0] + h11 * data[i, k + 1, 1]
-        flow[DRAG, i] = h00 * data[i, k, 2] + h10 * data[i, k, 3] + h01 * data[i, k + 1, 2] + h11 * data[i, k + 1, 3]
+        position = (flow[ALPHA, i] - rotor.section_start) * per_angle
+        nearest = min(max(math.floor(position + 0.5), 1.0), angles - 2.0)
+        flow[ANGLE_PART, i] = position - nearest
+        cell = angles * i + nearest
+        position = min(flow[SPEED, i] * per_speed - first_mach, machs - 2.0)
+        nearest = math.floor(position + 0.5)
+        flow[MACH_PART, i] = position - nearest
+        flow[CELL, i] = cell * machs + nearest
+    for i in range(rotor.stations.shape[0]):
+        middle = 2 * int(flow[CELL, i]) - 2
+        low, high = middle - 2 * machs, middle + 2 * machs
+        t = flow[ANGLE_PART, i]
+        a, b, c = 0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)
+        flow[NODES + 0, i] = a * nodes[low + 0] + b * nodes[middle + 0] + c * nodes[high + 0]
+        flow[NODES + 1, i] = a * nodes[low + 1] + b * nodes[middle + 1] + c * nodes[high + 1]
+        flow[NODES + 2, i] = a * nodes[low + 2] + b * nodes[middle + 2] + c * nodes[high + 2]
+        flow[NODES + 3, i] = a * nodes[low + 3] + b * nodes[middle + 3] + c * nodes[high + 3]
+        flow[NODES + 4, i] = a * nodes[low + 4] + b * nodes[middle + 4] + c * nodes[high + 4]
+        flow[NODES + 5, i] = a * nodes[low + 5] + b * nodes[middle + 5] + c * nodes[high + 5]
+    for i in range(rotor.stations.shape[0]):
+        t = flow[MACH_PART, i]
+        a, b, c = 0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)
+        flow[LIFT, i] = a * flow[NODES + 0, i] + b * flow[NODES + 2, i] + c * flow[NODES + 4, i]
+        flow[DRAG, i] = a * flow[NODES + 1, i] + b * flow[NODES + 3, i] + c * flow[NODES + 5, i]
 
 
 @inner_kernel
 def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) -> None:
     """Turn the coefficients into forces normal to and in the disc plane (overwriting LIFT and DRAG) [N].
 
-    Prandtl-Glauert from the data's Mach number; Lock's drag rise relative to the data's Mach number.
-
     Args:
-        air: Density and speed of sound.
+        air: Density.
         flow: Rows as left by ``_section_tables``; written: LIFT becomes the normal, DRAG the in-plane force.
     """
     for i in range(rotor.stations.shape[0]):
-        speed = flow[SPEED, i]
-        mach = speed / air.sound_speed
-        mach = min(mach, 0.9)
-        cl = flow[LIFT, i] * (rotor.reference_glauert[i] / math.sqrt(1.0 - mach * mach))
-        critical = rotor.drag_divergence[i] - 0.1 * abs(cl) - 0.1077
-        excess = mach - critical
-        excess = max(0.0, excess)
-        reference = rotor.reference_mach[i] - critical
-        reference = max(0.0, reference)
-        excess *= excess
-        reference *= reference
-        cd = flow[DRAG, i] + rotor.root_drag[i] + 20.0 * (excess * excess - reference * reference)
-        cd = max(cd, 0.003)
-        scale = 0.5 * air.density * speed * rotor.chord[i] * rotor.widths[i]
-        lift = scale * cl * rotor.lifting[i]
-        drag = scale * cd
+        scale = 0.5 * air.density * flow[SPEED, i] * rotor.chord[i] * rotor.widths[i]
+        lift = scale * flow[LIFT, i] * rotor.lifting[i]
+        drag = scale * (flow[DRAG, i] + rotor.root_drag[i])
         flow[LIFT, i] = lift * flow[UT, i] - drag * flow[UP, i]
         flow[DRAG, i] = lift * flow[UP, i] + drag * flow[UT, i]
 
@@ -199,7 +204,7 @@ def rotor_loads_in(
         gradient = (l1c * c + l1s * s) / rotor.radius
         axial = (vt + tip * l0 + vf * beta * c, tip * gradient + beta_rate - p * c)
         _section_flow(rotor, (vf * s, om), axial, root_pitch, flow)
-        _section_tables(rotor, flow)
+        _section_tables(rotor, air, flow)
         _section_forces(rotor, air, flow)
         normal_sum = 0.0
         drag_sum = 0.0
@@ -282,7 +287,10 @@ def inflow_rates(
     cos_skew = abs(through) / total
     l0_rate = om / rotor.apparent_mass * (thrust_coefficient - 2.0 * momentum * total)
     lateral_gain = 4.0 / ((1.0 + cos_skew) * mass_flow)
-    cosine_target = rotor.skew_gradient * sin_skew * l0 + lateral_gain * cos_skew * moment_scale * loads[COSINE_MOMENT]
+    # White and Blake's gradient grows with the skew alone and so with speed itself; near hover it is faded in.
+    onset = mu / max(rotor.skew_gradient_onset, 1e-9)
+    gradient = rotor.skew_gradient * (1.0 - math.exp(-onset * onset))
+    cosine_target = gradient * sin_skew * l0 + lateral_gain * cos_skew * moment_scale * loads[COSINE_MOMENT]
     sine_target = lateral_gain * moment_scale * loads[SINE_MOMENT]
     bandwidth = om / (rotor.gradient_apparent_mass * lateral_gain)
     return l0_rate, bandwidth * (cosine_target - l1c), bandwidth * (sine_target - l1s)

@@ -42,18 +42,16 @@ class RotorTables(NamedTuple):
     """Twist at the stations relative to 75 % radius [rad]."""
     root_drag: FloatArray
     """Extra drag coefficient of the thick root."""
-    drag_divergence: FloatArray
-    """Drag divergence Mach number at zero lift."""
-    reference_mach: FloatArray
-    """Mach number the section data were taken at."""
-    reference_glauert: FloatArray
-    """Prandtl-Glauert root at that Mach number."""
     section_start: float
     """First angle of attack of the section tables [rad]."""
     section_step: float
-    """Spacing of the section tables [rad]."""
+    """Their spacing in angle of attack [rad]."""
+    mach_start: float
+    """Their first Mach number."""
+    mach_step: float
+    """Their spacing in Mach number."""
     section: FloatArray
-    """Lift, its slope times the spacing, drag, its slope times the spacing; shape (stations, angles, 4)."""
+    """Nodes of lift and drag coefficient, shape (stations, angles, Mach numbers, 2)."""
     cos_azimuth: FloatArray
     """Cosines of the azimuth stations (0 aft, counter-clockwise)."""
     sin_azimuth: FloatArray
@@ -76,6 +74,8 @@ class RotorTables(NamedTuple):
     """Apparent-mass coefficient of the inflow gradients."""
     skew_gradient: float
     """Fore-aft inflow gradient over mean inflow at 90 deg of wake skew."""
+    skew_gradient_onset: float
+    """Advance ratio about which that gradient appears; 0: it is there from hover on."""
     side_by_side: Curves
     """Relative change of the induced velocity by the other rotor against in-plane advance ratio."""
 
@@ -112,20 +112,28 @@ class WingTables(NamedTuple):
 
 
 class BodyTables(NamedTuple):
-    """Fuselage, pylons and fins."""
+    """Fuselage, pylons, spinners, jets and fins."""
 
     fuselage: Curves
     """L/q [m^2], D/q [m^2], M/q [m^3] against angle of attack [rad]."""
     position: FloatArray
     """Fuselage reference point: stationline, waterline [m]."""
     pylon_area: Curves
-    """Drag area of the pylons in the rotor wake [m^2] against nacelle angle [rad]."""
+    """Drag area of the pylons [m^2] against nacelle angle [rad]."""
+    pylon_incidence_factor: Curves
+    """Factor on it against the angle between mast and free stream [rad]."""
     spinner_area: float
     """Spinner drag area at zero incidence, both [m^2]."""
     spinner_incidence_area: float
     """Spinner drag area growth with the cube of the sine of the mast incidence, both [m^2]."""
     fin_area: float
     """Drag area of the vertical fins [m^2]."""
+    jet_static: float
+    """Jet thrust of both engines without power at rest [N]."""
+    jet_per_power: float
+    """Its growth with the rotors' shaft power [N/W]."""
+    jet_ram: float
+    """Its fall with airspeed: air taken in [kg/s]."""
 
 
 class TailTables(NamedTuple):
@@ -205,7 +213,7 @@ class AircraftTables(NamedTuple):
     wing: WingTables
     """Wing."""
     body: BodyTables
-    """Fuselage, pylons, fins."""
+    """Fuselage, pylons, spinners, jets, fins."""
     tail: TailTables
     """Horizontal tail."""
     controls: ControlTables

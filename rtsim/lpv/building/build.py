@@ -58,9 +58,8 @@ class GridAircraft(Protocol):
     def outputs(self) -> Sequence[Variable]:
         """The ny outputs."""
 
-    @property
-    def rotor_speed(self) -> float:
-        """Rotor speed [rad/s]."""
+    def rotor_speed(self, nacelle: float) -> float:
+        """Rotor speed that is held at a place of the nacelle axis [rad/s]."""
 
     @property
     def attributes(self) -> dict[str, str | float | int]:
@@ -153,7 +152,7 @@ def build_database(
             airspeed=grid.airspeed,
             nacelle=grid.nacelle,
             flap=np.array([[aircraft.flap(v, n) for n in grid.nacelle] for v in grid.airspeed]),
-            rotor_speed=aircraft.rotor_speed,
+            rotor_speed=np.array([aircraft.rotor_speed(float(n)) for n in grid.nacelle]),
             states=tuple(aircraft.states),
             inputs=tuple(aircraft.inputs),
             outputs=tuple(aircraft.outputs),

@@ -137,7 +137,7 @@ def _predictor(database: Database, layer: int) -> Callable[[tuple[int, int], tup
     """Function that predicts (x, u) of one grid point from the linear model of another."""
     nx, nu = len(database.states), len(database.inputs)
     iu, iw, ip = (required_position(database.states, name, "the neighbour check") for name in ("u", "w", "pitch"))
-    altitude = position(database.states, "altitude")
+    altitude, drive = position(database.states, "altitude"), position(database.inputs, "rotor_speed")
     free_inputs = np.flatnonzero(np.ptp(database.u_ref[database.valid], axis=0) > 0.0)
     unknown = np.concatenate([np.flatnonzero(np.arange(nx) != altitude), nx + free_inputs])
     acceleration = float(database.layer_acceleration[layer])
@@ -152,7 +152,11 @@ def _predictor(database: Database, layer: int) -> Callable[[tuple[int, int], tup
         system[iw, ip] -= acceleration * cosine
         system[nx, iu], system[nx, iw], system[nx, ip] = cosine, sine, -x[iu] * sine + x[iw] * cosine
         wanted = np.zeros(nx + 1)
-        wanted[:nx] = -database.df_dnacelle[layer][start] * (database.nacelle[end[1]] - database.nacelle[start[1]])
+        turned = max(database.nacelle[end[1]], 0.0) - max(database.nacelle[start[1]], 0.0)
+        wanted[:nx] = -database.df_dnacelle[layer][start] * turned
+        slower = database.rotor_speed[end[1]] - database.rotor_speed[start[1]]
+        if slower != 0.0:
+            wanted[:nx] -= database.B[layer][start][:, drive] * slower
         wanted[nx] = database.airspeed[end[0]] - database.airspeed[start[0]]
         # rows of very different size (flapping accelerations, speeds): scaled, so that least squares sees all of them
         size = np.maximum(np.abs(system).max(axis=1), 1e-12)

@@ -1,8 +1,9 @@
 """The grid of the shipped database: its axes, and which part of it is worth solving.
 
 The spacing is what the paper's own density check asks for (see ``rtsim.lpv.building.checks``): 5 kn below 60 kn,
-3.5 kn where the low side of the corridor nears stall (74 to 109 kn), 7 kn to 130 kn, 10 kn above, and 2.5 kn where the
-flaps retract on the downstop; nacelle 2.5 deg above 60 deg, 5 deg below.
+2.5 kn about hover, where the fore-and-aft inflow gradient fades in, 3.5 kn where the low side of the corridor nears
+stall (60 to 109 kn), 7 kn to 130 kn, 10 kn above, and 2.5 kn where the flaps retract on the downstop; nacelle 2.5 deg
+above 60 deg, 5 deg below.
 """
 
 from __future__ import annotations
@@ -16,9 +17,10 @@ from rtsim.units import DEGREE, KNOT, deg, kt
 
 AIRSPEED_KT = np.concatenate(
     [
-        np.arange(-20.0, 60.0, 5.0),
-        [60.0, 67.0],
-        np.arange(74.0, 109.0, 3.5),
+        np.arange(-20.0, -5.0, 5.0),
+        np.arange(-5.0, 7.5, 2.5),
+        np.arange(10.0, 60.0, 5.0),
+        np.arange(60.0, 109.0, 3.5),
         [109.0, 116.0, 123.0],
         np.arange(130.0, 170.0, 10.0),
         np.arange(170.0, 180.0, 2.5),
@@ -26,8 +28,9 @@ AIRSPEED_KT = np.concatenate(
     ]
 )
 """Airspeed axis [kn], signed: hover by hand and tailwinds go below zero."""
-NACELLE_DEG = np.concatenate([[0.0, 0.5], np.arange(5.0, 60.0, 5.0), np.arange(60.0, 91.0, 2.5)])
-"""Nacelle axis [deg]; 0.5 is the end of the downstop, where the flap schedule changes."""
+NACELLE_DEG = np.concatenate([[-3.0, -2.0, -1.0, 0.0, 0.5], np.arange(5.0, 60.0, 5.0), np.arange(60.0, 91.0, 2.5)])
+"""Nacelle axis [deg]; 0.5 is the end of the downstop, where the flap schedule changes. Below 0 the nacelles stay at 0
+and the rotor speed comes down, to that of airplane mode in the first row."""
 LAYERS_KT_S = np.array([-3.0, -1.5, 0.0, 1.5, 3.0])
 """Level acceleration of the layers [kn/s]; 3 kn/s is what Table 1 of the paper flies. With the layers between, flights
 at 0.8 to 2.6 kn/s differ half as much from the nonlinear model as without (docs/lpv.md)."""
@@ -50,7 +53,7 @@ class Grid:
     airspeed: FloatArray
     """Airspeed (V,) [m/s], ascending."""
     nacelle: FloatArray
-    """Nacelle angle (N,) [rad], ascending."""
+    """Nacelle axis (N,) [rad], ascending; below 0 rows of lower rotor speed."""
     wanted: BoolArray
     """Which cells are worth solving (V, N)."""
 

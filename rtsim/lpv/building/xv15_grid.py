@@ -19,8 +19,9 @@ from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STAT
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.lpv.building.build import GridPoint, Guess, Jacobians
+from rtsim.lpv.building.grid import NACELLE_DEG
 from rtsim.lpv.database import Database
-from rtsim.units import DEGREE, KNOT
+from rtsim.units import DEGREE, KNOT, deg
 
 WING_ALPHA_LIMIT = 16.0 * DEGREE
 """Largest wing angle of attack of an unstalled trim where the wing carries the aircraft [rad]."""
@@ -37,7 +38,7 @@ CORNER_AIRSPEED, CORNER_NACELLE = 0.1, 1e-3
 
 MODEL_DATA = files(rtsim.aircraft.xv15) / "data"
 """Folder of the nonlinear model's data."""
-MODEL_FILES = ("model_choices.toml", "xv15_inputs.toml")
+MODEL_FILES = ("model_choices.toml", "rotor_sections.toml", "xv15_inputs.toml")
 """Data of the nonlinear model, in the order in which they are hashed."""
 SAMPLE = 29
 """One trim in so many is checked by ``still_trims``."""
@@ -67,10 +68,11 @@ class Xv15Grid:
         """The outputs of the nonlinear model."""
         return OUTPUTS
 
-    @property
-    def rotor_speed(self) -> float:
-        """Rotor speed, held [rad/s]."""
-        return float(self.aircraft.tables.configuration.rotor_speed)
+    def rotor_speed(self, nacelle: float) -> float:
+        """Rotor speed that is held at a place of the nacelle axis [rad/s]: below 0 it falls to airplane mode's."""
+        full = float(self.aircraft.tables.configuration.rotor_speed)
+        share = max(-nacelle, 0.0) / -deg(float(NACELLE_DEG[0]))
+        return full + share * (self.aircraft.airplane_rotor_speed - full)
 
     @property
     def attributes(self) -> dict[str, str | float | int]:
@@ -97,7 +99,7 @@ class Xv15Grid:
         start = None
         if guess is not None:
             start = TrimPoint(guess[0], guess[1], np.zeros(len(OUTPUTS)), np.zeros(len(STATES)), True, 0.0)
-        point = self.aircraft.trim(_condition(airspeed, nacelle, acceleration), start)
+        point = self.aircraft.trim(self._condition(airspeed, nacelle, acceleration), start)
         return GridPoint(point.x, point.u, point.y, point.xdot) if point.converged else None
 
     def reject(self, point: GridPoint, airspeed: float, nacelle: float) -> str | None:
@@ -137,12 +139,20 @@ class Xv15Grid:
             acceleration: Its level acceleration [m/s^2].
         """
         trim = TrimPoint(point.x, point.u, point.y, point.xdot, True, 0.0)
-        model = flown_model(self.aircraft, _condition(airspeed, nacelle, acceleration), trim)
+        model = flown_model(self.aircraft, self._condition(airspeed, nacelle, acceleration), trim)
         return model.A, model.B, model.C, model.D, model.df_dnacelle
 
     def flap(self, airspeed: float, nacelle: float) -> float:
         """Flap deflection of the schedule [rad]."""
         return float(kernels.flap_schedule(self.aircraft.tables.controls, airspeed, nacelle))
+
+    def _condition(self, airspeed: float, nacelle: float, acceleration: float) -> Condition:
+        return Condition(
+            airspeed=airspeed,
+            nacelle_angle=max(nacelle, 0.0),
+            acceleration=acceleration,
+            rotor_speed=self.rotor_speed(nacelle),
+        )
 
 
 def flown_model(aircraft: Xv15, condition: Condition, trim: TrimPoint) -> LinearModel:
@@ -165,10 +175,6 @@ def flown_model(aircraft: Xv15, condition: Condition, trim: TrimPoint) -> Linear
             model = frozen
         model = replace(model, df_dnacelle=frozen.df_dnacelle)
     return model
-
-
-def _condition(airspeed: float, nacelle: float, acceleration: float) -> Condition:
-    return Condition(airspeed=airspeed, nacelle_angle=nacelle, acceleration=acceleration)
 
 
 def source_sha256() -> str:
@@ -197,7 +203,8 @@ def still_trims(database: Database) -> bool:
     if (database.states, database.inputs, database.outputs) != (STATES, INPUTS, OUTPUTS):
         return False
     for cell in map(tuple, np.argwhere(database.valid)[::SAMPLE]):
-        x, u, nacelle = database.x_ref[cell], database.u_ref[cell], float(database.nacelle[cell[2]])
+        x, u, nacelle = database.x_ref[cell], database.u_ref[cell].copy(), max(float(database.nacelle[cell[2]]), 0.0)
+        u[INPUT.rotor_speed] = database.rotor_speed[cell[2]] - aircraft.tables.configuration.rotor_speed
         rate, y = aircraft.derivative(x, u, nacelle), aircraft.outputs(x, u, nacelle)
         if np.max(np.abs(rate - database.xdot_ref[cell])) > STILL_TRIM:
             return False

@@ -58,9 +58,8 @@ def assemble_database(
     for name, array in values.items():
         values[name] = _as_array(name, array, file)
     _complete(values)
-    if values["rotor_speed"].size != 1:
-        raise InputError("is not one number", file=file, key="rotor_speed", mend="give the rotor speed that is held")
-    values["rotor_speed"] = values["rotor_speed"].item()
+    if values["rotor_speed"].size == 1:  # one for all rows
+        values["rotor_speed"] = np.full(np.asarray(values["nacelle"]).size, values["rotor_speed"].item())
     for design, stored in pilot.items():
         for name, array in stored.arrays.items():
             if not np.all(np.isfinite(array)):

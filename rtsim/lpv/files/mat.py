@@ -92,7 +92,7 @@ def _cells(texts: Sequence[str]) -> Any:
 
 def _reshaped(name: str, value: Any) -> Any:
     array = np.asarray(value)
-    if name in AXES:
+    if name in (*AXES, "rotor_speed"):
         return array.reshape(-1)
     missing = _DIMENSIONS.get(name, 0) - array.ndim
     return array.reshape(array.shape + (1,) * missing) if missing > 0 else array

@@ -145,7 +145,7 @@ def _write(dataset: Any, database: Database) -> None:
     _put(dataset, "airspeed", ("airspeed",), database.airspeed)
     _put(dataset, "nacelle", ("nacelle",), database.nacelle)
     _put(dataset, "flap", ("airspeed", "nacelle"), database.flap)
-    _put(dataset, "rotor_speed", (), np.array(database.rotor_speed))
+    _put(dataset, "rotor_speed", ("nacelle",), database.rotor_speed)
     for name in GRIDDED:
         values = getattr(database, name)
         if name != "valid":
