@@ -265,7 +265,7 @@ class FlightOptions:
     )
     fuel: float = option(
         FULL_TANKS,
-        help="Fuel at the start; the weight of the aircraft does not change with it.",
+        help="Fuel at the start, no more than the tanks hold; the weight does not change with it.",
         panel="Start",
         key="fuel_lb",
         unit="lb",
