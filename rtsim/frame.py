@@ -171,6 +171,8 @@ SIGNALS: tuple[Signal, ...] = (
     ),
     Signal("thrust_coefficient_over_solidity", "", "rotor", "CT/sigma of one rotor: its load, rotor convention."),
     Signal("advance_ratio", "", "rotor", "Speed of the air across the rotor disc over tip speed."),
+    Signal("weight_on_wheels", "", "altitude", "Force of the ground on the wheels over the weight."),
+    Signal("ground_effect", "", "rotor", "Ground effect: 0 far from the ground, 1 hovering on the wheels."),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

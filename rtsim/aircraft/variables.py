@@ -25,6 +25,7 @@ ROLES: dict[str, dict[str, str]] = {
         "gust": "motion of the air",
         "flap": "flaps less their schedule",
         "drive": "rotor speed less the one that is held",
+        "ground": "nearness of the ground, and what its contact does",
     },
     "output": {"rotor": "loads and motion of the rotors", "body": "what the whole aircraft does"},
 }
@@ -84,6 +85,10 @@ INPUTS: tuple[Variable, ...] = (
     Variable("flap_20_40", "rad", "Flap deflection between 20 and 40 deg, less that of the flap schedule", "flap"),
     Variable("flap_40_75", "rad", "Flap deflection between 40 and 75 deg, less that of the flap schedule", "flap"),
     Variable("rotor_speed", "rad/s", "Rotor speed less the one that is held", "drive"),
+    Variable("ground_effect", "", "Ground effect: 0 far from the ground, 1 hovering on the wheels", "ground"),
+    Variable("contact_x", "m/s^2", "Force of the ground on the wheels along body x over mass", "ground"),
+    Variable("contact_z", "m/s^2", "The same along body z", "ground"),
+    Variable("contact_pitch", "rad/s^2", "Its pitching moment over the moment of inertia", "ground"),
 )
 OUTPUTS: tuple[Variable, ...] = (
     Variable("thrust", "N", "Thrust of one rotor along its mast", "rotor"),
@@ -185,8 +190,10 @@ GUST_INPUTS = ("gust_u", "gust_w")
 FLAP_INPUTS = _names(INPUTS, "flap")
 """Inputs that move the flaps: one for each interval between published settings, in which the aerodynamics are linear
 in the deflection. Together they are the flap deflection less that of the schedule."""
-AUXILIARY_INPUTS = _names(INPUTS, "flap", "drive")
-"""Inputs that are zero while flaps and rotor speed are where schedule and governor have them."""
+GROUND_INPUTS = _names(INPUTS, "ground")
+"""Inputs through which a ground acts."""
+AUXILIARY_INPUTS = _names(INPUTS, "flap", "drive", "ground")
+"""Inputs that are zero while flaps and rotor speed are where schedule and governor have them, away from the ground."""
 
 STATE = Places(*(variable.name for variable in STATES))
 """Index of a state by name, usable in compiled kernels."""

@@ -34,7 +34,9 @@ def performance_command(
     *,
     weight_lb: Annotated[float, typer.Option(help="Weight [lb].")] = 13_000.0,
     altitude_ft: Annotated[float, typer.Option(help="Pressure altitude of climb and level flight [ft].")] = 0.0,
-    rotor_rpm: Annotated[float, typer.Option(help="Rotor speed [rpm].")] = 589.0,
+    rotor_rpm: Annotated[
+        float | None, typer.Option(help="Rotor speed [rpm].", show_default="589, and 517 at nacelle 0")
+    ] = None,
     rating: Annotated[
         str | None,
         typer.Option(
@@ -56,7 +58,7 @@ def performance_command(
         ("--altitude-ft", altitude_ft, -3000.0, 36000.0, "ft"),
         ("--rotor-rpm", rotor_rpm, 400.0, 700.0, "rpm"),
     ):
-        if not low <= value <= high:
+        if value is not None and not low <= value <= high:
             raise InputError("is out of range", key=key, value=value, allowed=f"{low:g} to {high:g} {unit}")
     if rating is not None and rating not in get_args(EngineRating):
         allowed = ", ".join(get_args(EngineRating))
@@ -68,18 +70,24 @@ def performance_command(
         _print(result)
 
 
-def _figures(weight_lb: float, altitude_ft: float, rotor_rpm: float, rating: EngineRating | None) -> dict[str, Any]:
+def _figures(
+    weight_lb: float, altitude_ft: float, rotor_rpm: float | None, rating: EngineRating | None
+) -> dict[str, Any]:
     from rtsim.aircraft.points import Condition
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.analysis.performance import best_climb, hover_ceiling, level_speed
     from rtsim.systems.engine import power_available
-    from rtsim.units import FOOT, deg, kt, lb, rpm, to_kt
+    from rtsim.units import FOOT, deg, kt, lb, rpm, to_kt, to_rpm
 
     aircraft, altitude = Xv15.load(), altitude_ft * FOOT
-    mass, rotor_speed = lb(weight_lb), rpm(rotor_rpm)
-    hover = hover_ceiling(aircraft, mass=mass, rotor_speed=rotor_speed, rating=rating or "takeoff")
+    mass = lb(weight_lb)
+    full = aircraft.tables.configuration.rotor_speed if rotor_rpm is None else rpm(rotor_rpm)
+    hover = hover_ceiling(aircraft, mass=mass, rotor_speed=full, rating=rating or "takeoff")
     climbs, speeds = [], []
     for nacelle_deg, airspeeds, begin in _SEARCHED:
+        lowered = nacelle_deg == 0.0 and rotor_rpm is None
+        rotor_speed = aircraft.airplane_rotor_speed if lowered else full
+        where = {"nacelle_deg": nacelle_deg, "rotor_rpm": to_rpm(rotor_speed)}
         condition = Condition(
             airspeed=kt(begin), nacelle_angle=deg(nacelle_deg), mass=mass, rotor_speed=rotor_speed,
             pressure_altitude=altitude,
@@ -89,18 +97,19 @@ def _figures(weight_lb: float, altitude_ft: float, rotor_rpm: float, rating: Eng
         near = [] if math.isnan(at) else [at + kt(offset) for offset in (-5.0, 0.0, 5.0)]
         at, climb = best_climb(aircraft, condition, near, power=power)
         climbs.append(
-            {"nacelle_deg": nacelle_deg, "rating": rating or "military", "airspeed_kt": _number(to_kt(at)),
+            {**where, "rating": rating or "military", "airspeed_kt": _number(to_kt(at)),
              "climb_rate_ft_min": _number(climb.value / FOOT * 60.0), "limit": climb.limit}
         )  # fmt: skip
         fast = level_speed(aircraft, condition, power=power_available(rating or "normal", altitude))
         speeds.append(
-            {"nacelle_deg": nacelle_deg, "rating": rating or "normal", "airspeed_kt": _number(to_kt(fast.value)),
+            {**where, "rating": rating or "normal", "airspeed_kt": _number(to_kt(fast.value)),
              "limit": fast.limit, **_burned(fast, condition)}
         )  # fmt: skip
     return {
-        "weight_lb": weight_lb, "altitude_ft": altitude_ft, "rotor_rpm": rotor_rpm,
+        "weight_lb": weight_lb, "altitude_ft": altitude_ft,
         "hover_ceiling": {
-            "rating": rating or "takeoff", "altitude_ft": _number(hover.value / FOOT), "limit": hover.limit,
+            "rotor_rpm": to_rpm(full), "rating": rating or "takeoff", "altitude_ft": _number(hover.value / FOOT),
+            "limit": hover.limit,
         },
         "climb": climbs, "level_speed": speeds,
     }  # fmt: skip
@@ -124,22 +133,20 @@ def _number(value: float) -> float | None:
 
 
 def _print(result: dict[str, Any]) -> None:
-    def say(what: str, rating: str, figure: str, limit: str) -> None:
-        why = "" if figure == "none" else _WORDS[limit]
-        results.print(
-            f"{what:24} {rating:11} {figure:24} {why}".rstrip(), highlight=False, markup=False, soft_wrap=True
-        )
+    def say(what: str, found: dict[str, Any], figure: str) -> None:
+        why = "" if figure == "none" else _WORDS[found["limit"]]
+        line = f"{what:24} {found['rotor_rpm']:3.0f} rpm  {found['rating']:11} {figure:24} {why}"
+        results.print(line.rstrip(), highlight=False, markup=False, soft_wrap=True)
 
-    at = f"{result['weight_lb']:g} lb, {result['rotor_rpm']:g} rpm"
-    results.print(f"XV-15 at {at}; climb and level flight at {result['altitude_ft']:g} ft", highlight=False)
+    at = f"{result['altitude_ft']:g} ft"
+    results.print(f"XV-15 at {result['weight_lb']:g} lb; climb and level flight at {at}", highlight=False)
     hover = result["hover_ceiling"]
-    ceiling = "below sea level" if hover["altitude_ft"] is None else f"{hover['altitude_ft']:.0f} ft"
-    say("hover ceiling", hover["rating"], ceiling, hover["limit"])
+    say("hover ceiling", hover, "none" if hover["altitude_ft"] is None else f"{hover['altitude_ft']:.0f} ft")
     for climb in result["climb"]:
         rate = climb["climb_rate_ft_min"]
         figure = "none" if rate is None else f"{rate:.0f} ft/min at {climb['airspeed_kt']:.0f} kn"
-        say(f"climb, nacelle {climb['nacelle_deg']:g} deg", climb["rating"], figure, climb["limit"])
+        say(f"climb, nacelle {climb['nacelle_deg']:g} deg", climb, figure)
     for speed in result["level_speed"]:
         knots = speed["airspeed_kt"]
         figure = "none" if knots is None else f"{knots:.1f} kn, {speed['fuel_flow_lb_h']:.0f} lb/h"
-        say(f"level, nacelle {speed['nacelle_deg']:g} deg", speed["rating"], figure, speed["limit"])
+        say(f"level, nacelle {speed['nacelle_deg']:g} deg", speed, figure)

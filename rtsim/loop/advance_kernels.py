@@ -27,6 +27,7 @@ from rtsim.protection.law_kernels import law_apply, law_due
 from rtsim.systems.drive_kernels import HELD_OFFSET, LOCKED, drive_advance, engine_power, held_advance, rotor_speed_now
 from rtsim.systems.engine_kernels import burn
 from rtsim.systems.flap_kernels import flap_advance
+from rtsim.systems.ground_kernels import touches
 from rtsim.units import DEGREE, HORSEPOWER, KNOT
 
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
@@ -344,7 +345,8 @@ def _end_code(flight: Flight) -> int:
         if not math.isfinite(x[i]):
             return END.not_finite
     pitch = x[STATE.pitch]
-    if x[STATE.altitude] < 0.0:
+    stands = tables.ground.active != 0.0
+    if touches(tables.ground, x) if stands else x[STATE.altitude] < 0.0:
         st, ct = math.sin(pitch), math.cos(pitch)
         sink = x[STATE.w] * ct - x[STATE.u] * st
         state.clock[CLOCK.sink] = sink
@@ -352,11 +354,10 @@ def _end_code(flight: Flight) -> int:
         upright = (
             abs(pitch) <= LANDING_PITCH and state.nacelle[1] >= LANDING_NACELLE and abs(ground_speed) <= LANDING_SPEED
         )
-        if upright and sink <= GENTLE_SINK_RATE:
-            return END.gentle_landing
-        if upright and sink <= HARD_SINK_RATE:
-            return END.hard_landing
-        return END.crash
+        if not (upright and sink <= (tables.ground.most_sink if stands else HARD_SINK_RATE)):
+            return END.crash
+        if not stands:
+            return END.gentle_landing if sink <= GENTLE_SINK_RATE else END.hard_landing
     rotor_speed = rotor_speed_now(drive, state.drive)
     if rotor_speed > drive.highest:
         return END.rotors_fast

@@ -20,6 +20,7 @@ from rtsim.protection.law_data import ProtectionTables
 from rtsim.systems.drive_kernels import DriveTables
 from rtsim.systems.engine_kernels import EngineTables
 from rtsim.systems.flap_kernels import FlapTables
+from rtsim.systems.ground_kernels import GroundTables
 
 MODE = Places("mocm", "external", "hold")
 """Who flies, as a number in the clock and in the ``pilot_mode`` column."""
@@ -112,6 +113,8 @@ class SimulationTables(NamedTuple):
     """What moves the flaps."""
     drive: DriveTables
     """What turns the rotors."""
+    ground: GroundTables
+    """The ground, and what the aircraft has to meet it."""
     engine: EngineTables
     """Power that the engines have, fuel that they burn."""
     aids: AidTables

@@ -22,6 +22,7 @@ from rtsim.pilot.layout_kernels import TARGET
 from rtsim.systems.drive_kernels import DEVIATION, HELD_OFFSET, engine_power, rotor_speed_now, schedule_angle
 from rtsim.systems.engine_kernels import TANK, advance_ratio, fuel_flow, takeoff_power, thrust_over_solidity
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
+from rtsim.systems.ground_kernels import ground_contact, ground_effect
 
 
 @inner_kernel
@@ -80,6 +81,10 @@ def observe(flight: Flight) -> None:
     place = schedule_angle(tables.drive, drive, angle)
     scratch.known[KNOWN.place] = place
     state.u[INPUT.rotor_speed] = drive[DEVIATION] + tables.drive.held_acts * drive[HELD_OFFSET]
+    on_wheels = 0.0
+    if tables.ground.active != 0.0:
+        state.u[INPUT.ground_effect] = ground_effect(tables.ground, x[STATE.altitude], angle, speed)
+        on_wheels = ground_contact(tables.ground, x, tables.wind, state.u)
     where = place if tables.drive.held_acts == 0.0 else angle
     aircraft = tables.plant.aircraft
     call_at(flight.parts[PART.outputs], aircraft, x, state.u, where, scratch.y, scratch.xdot, scratch.work)
@@ -142,6 +147,8 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.gust_w] = gusts[GUST.w]
     si[QUANTITY.gust_q] = gusts[GUST.q]
     si[QUANTITY.failures] = float(fault_mask(state.faults))
+    si[QUANTITY.weight_on_wheels] = on_wheels
+    si[QUANTITY.ground_effect] = state.u[INPUT.ground_effect]
     across = ahead * math.sin(angle) + below * math.cos(angle)
     si[QUANTITY.advance_ratio] = advance_ratio(tables.engine, across, rotor_speed)
     si[QUANTITY.thrust_coefficient_over_solidity] = thrust_over_solidity(tables.engine, y[OUTPUT.thrust], rotor_speed)

@@ -256,9 +256,16 @@ class FlightOptions:
         default_words="that of the conversion, 589",
         page="systems.md",
     )
+    ground: bool = option(
+        False,
+        help="Put a flat ground under the wheels, with ground effect: land, stand, take off; else touching it ends the"
+        " flight.",
+        panel="Air",
+        page="ground.md",
+    )
     fuel: float = option(
         FULL_TANKS,
-        help="Fuel at the start; the weight of the aircraft does not change with it.",
+        help="Fuel at the start, no more than the tanks hold; the weight does not change with it.",
         panel="Start",
         key="fuel_lb",
         unit="lb",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +14,7 @@ from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVE
 from rtsim.aids.design import design_aids, switches_of
 from rtsim.aircraft.controls import control_tables
 from rtsim.aircraft.points import Condition
-from rtsim.aircraft.variables import AUXILIARY_INPUTS, INPUTS, OUTPUTS, STATE, STATES, of_role
+from rtsim.aircraft.variables import FLAP_INPUTS, GROUND_INPUTS, INPUTS, OUTPUTS, STATE, STATES, of_role
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.arrays import FloatArray
@@ -51,7 +52,7 @@ from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
-from rtsim.lpv.flown import flown_database, moves_flaps, turns_rotors
+from rtsim.lpv.flown import flown_database, meets_ground, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables, scheduling_speed
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
@@ -71,6 +72,7 @@ from rtsim.protection.tables import law_tables
 from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED, HELD_OFFSET, HELD_SETTING
 from rtsim.systems.engine import load_engine_tables
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
+from rtsim.systems.ground import light_on_wheels, load_ground_tables, no_ground
 from rtsim.systems.requests import held_offset
 from rtsim.systems.settings import load_drive_tables, load_flap_tables
 from rtsim.units import to_deg, to_kt
@@ -141,22 +143,22 @@ def _start(setup: FlightSetup) -> tuple[float, float, float]:
 
 @functools.lru_cache(maxsize=16)
 def start_trim(
-    nonlinear: bool, database: Database, airspeed: float, nacelle: float, held: tuple[float, float]
+    nonlinear: bool, database: Database, airspeed: float, nacelle: float, held: tuple[float, float] | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Trimmed state and inputs in level flight, altitude 0, read-only; kept, since batches start alike.
 
     Args:
         nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
-        held: Rotor speed [rad/s], and its place on the nacelle axis of the database [rad].
+        held: Rotor speed [rad/s], and its place on the nacelle axis of the database [rad]; None: that of the conversion.
 
     Raises:
         InputError: There is no trim.
     """
     if nonlinear:
-        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held[0]))
+        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held and held[0]))
         converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
     else:
-        point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=held[1])
+        point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=held[1] if held else nacelle)
         converged, x, u = point.converged, point.x.copy(), point.u.copy()
     if not converged:
         raise InputError(
@@ -206,6 +208,11 @@ def build_parts(setup: FlightSetup) -> Parts:
     offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
     x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle, held))
+    ground = load_ground_tables(profile, mass=own.configuration.mass) if options.ground else no_ground()
+    if options.ground:
+        if not nonlinear and not meets_ground(loaded):
+            raise needed_inputs_error("ground", "on", "false", GROUND_INPUTS)
+        altitude = max(altitude, light_on_wheels(ground, float(x[STATE.pitch])))
     x[STATE.altitude] = altitude
     programme = setup.programme
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
@@ -225,6 +232,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         pilot=pilot,
         flaps=load_flap_tables(profile),
         drive=drive,
+        ground=ground,
         engine=load_engine_tables(profile, density=own.configuration.density),
         aids=design_aids(database),
         gusts=gust_tables(setup.air, profile),
@@ -302,12 +310,24 @@ def needed_aid_error(name: str) -> InputError:
     Args:
         name: The aid.
     """
+    return needed_inputs_error(name, "off", "on", (*FLAP_INPUTS, "rotor_speed"))
+
+
+def needed_inputs_error(key: str, value: str, allowed: str, inputs: Sequence[str]) -> InputError:
+    """The refusal of what a database does not know.
+
+    Args:
+        key: What was asked for.
+        value: What it was to be.
+        allowed: What it can be.
+        inputs: Inputs that the database lacks.
+    """
     return InputError(
-        "cannot be switched off: the database does not say what the aircraft does without it",
-        key=name,
-        value="off",
-        allowed="on",
-        mend=f"give the database the inputs {', '.join(AUXILIARY_INPUTS)} (docs/lpv.md), or fly the nonlinear plant",
+        f"cannot be {value}: the database does not say what the aircraft does then",
+        key=key,
+        value=value,
+        allowed=allowed,
+        mend=f"give the database the inputs {', '.join(inputs)} (docs/lpv.md), or fly the nonlinear plant",
     )
 
 

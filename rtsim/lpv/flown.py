@@ -9,7 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from rtsim.aircraft.variables import AUXILIARY_INPUTS, FLAP_INPUTS, INPUTS, OUTPUTS, STATES, Variable, position
+from rtsim.aircraft.variables import (
+    AUXILIARY_INPUTS,
+    FLAP_INPUTS,
+    GROUND_INPUTS,
+    INPUTS,
+    OUTPUTS,
+    STATES,
+    Variable,
+    position,
+)
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
@@ -73,6 +82,11 @@ def moves_flaps(database: Database) -> bool:
 def turns_rotors(database: Database) -> bool:
     """Whether a database knows what the rotor speed does."""
     return "rotor_speed" in {variable.name for variable in database.inputs}
+
+
+def meets_ground(database: Database) -> bool:
+    """Whether a database knows what the ground does."""
+    return set(GROUND_INPUTS) <= {variable.name for variable in database.inputs}
 
 
 def _refuse(

@@ -24,6 +24,8 @@ MEMORY_ROWS = 65_536
 """Rows of a history that are kept in memory besides those that came last, 35 MB: 4 minutes at 250 Hz."""
 _VIEW_PIECE = 64
 _VIEW_BACKLOG = 1024
+_CLEAR_OF_GROUND_M = 0.5
+"""Wheels this high have left the ground [m]."""
 _LATENESS, _DROPPED = (
     [signal.name for signal in TIMING_SIGNALS].index(name) for name in ("lateness_us", "telemetry_dropped")
 )
@@ -229,6 +231,7 @@ class FlightSinks:
         self._limits = limits(self.event) if limits is not None else None
         self._level = 0.0
         self._fuel = 0.0
+        self._grounded: bool | None = None
         self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
 
     def view(self, row: FloatArray, timing: FloatArray) -> None:
@@ -254,6 +257,7 @@ class FlightSinks:
         if self._watch_corridor and row[COLUMN.corridor_level] != self._level:
             self._tell_level(row)
         self._watch_fuel(row[None, :])
+        self._watch_wheels(row[None, :])
         if self._limits is not None:
             self._limits.row(row)
         if self._on_rows is not None:
@@ -276,6 +280,7 @@ class FlightSinks:
             for number in np.flatnonzero(levels != before):
                 self._tell_level(rows[number])
         self._watch_fuel(rows)
+        self._watch_wheels(rows)
         if self._limits is not None:
             self._limits.flush()
             self._limits.rows(rows)
@@ -335,6 +340,21 @@ class FlightSinks:
         row = rows[int(np.argmin(fuel > 0.0))]
         text = "the fuel is used up: the engines stop"
         self.event(LogEvent(int(row[COLUMN.frame]), float(row[COLUMN.time_s]), "fuel", text, "warning", {}))
+
+    def _watch_wheels(self, rows: FloatArray) -> None:
+        """Say when the wheels touch the ground and when they have left it; bounces in between are not told."""
+        loads = rows[:, COLUMN.weight_on_wheels]
+        if self._grounded is None:
+            self._grounded = bool(loads[0] > 0.0)
+        if not self._grounded and not loads.any():
+            return
+        for row in rows:
+            touching = row[COLUMN.weight_on_wheels] > 0.0
+            if touching == self._grounded or (self._grounded and row[COLUMN.altitude_m] < _CLEAR_OF_GROUND_M):
+                continue
+            self._grounded = bool(touching)
+            text = f"touched down, sinking at {-row[COLUMN.climb_rate_m_s]:.2f} m/s" if touching else "lifted off"
+            self.event(LogEvent(int(row[COLUMN.frame]), float(row[COLUMN.time_s]), "wheels", text, "info", {}))
 
     def _tell_level(self, row: FloatArray) -> None:
         level = int(row[COLUMN.corridor_level])

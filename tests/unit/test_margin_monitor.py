@@ -12,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.command import SENSOR, Command, Sensors
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.frame import COLUMN, SIGNAL_COUNT
+from rtsim.kernels.compiled import interpreted
 from rtsim.protection import monitor_kernels as kernels
 from rtsim.protection.assessment import assess_warnings
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels, load_limits
@@ -272,6 +275,15 @@ def test_rotor_endurance_is_the_published_table(monitor, ratio, angle, limit):
         margins, levels, _ = watched_row(monitor, thrust_coefficient_over_solidity=load, **columns)
         assert margins["rotor_endurance"] == pytest.approx(1.0 - load / limit)
         assert levels["rotor_endurance"] == (1.0 if load > limit else 0.0)
+
+
+@given(ratio=st.floats(0.0, 0.8), angle=st.floats(0.0, 95.0))
+def test_rotor_endurance_is_linear_between_its_points(ratio, angle):
+    """Against numpy's interpolation, along the advance ratio and then along the angle."""
+    tables = load_limits().rotor
+    along = [np.interp(ratio, tables.advance_ratio, row) for row in tables.endurance]
+    got = interpreted(kernels.endurance_limit)(tables, ratio, deg(angle))
+    assert got == pytest.approx(np.interp(deg(angle), tables.nacelle, along), rel=1e-12)
 
 
 def test_what_only_the_frame_knows_is_not_watched_from_sensors_alone(monitor):

