@@ -19,7 +19,7 @@ def register(app: typer.Typer) -> None:
 def rotor_command(
     *,
     thrust_coefficient: Annotated[float, typer.Option(help="C_T = T/(rho A (Omega R)^2) that the rotor carries.")],
-    tip_mach: Annotated[float, typer.Option(help="Tip speed over the speed of sound; 0.653 in helicopter flight.")],
+    tip_mach: Annotated[float, typer.Option(help="Tip speed over the speed of sound; 0.69 at 589 rpm.")],
     advance_ratio: Annotated[float, typer.Option(help="Airspeed over tip speed, V/(Omega R); 0 is hover.")] = 0.0,
     shaft_deg: Annotated[
         float, typer.Option(help="Tilt of the shaft from normal to the flow [deg], positive aft; -90: a propeller.")
