@@ -381,5 +381,7 @@ def draw_figures(validation: Validation, directory: Path) -> dict[str, dict[str,
         for plan in FIGURES:
             figure = Figure(figsize=plan.size, layout="constrained")
             plan.draw(validation, figure)
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")  # laid out once for both formats
             files[plan.stem] = save_both(figure, directory, plan.stem)
     return files
