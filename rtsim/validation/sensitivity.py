@@ -57,7 +57,8 @@ class Uncertain:
     def range_text(self) -> str:
         """The range in words."""
         if not self.share:
-            return f"{self.value()}: {self.low} to {self.high}"
+            value = self.value()
+            return f"{f'{value:.4g}' if type(value) is float else value}: {self.low} to {self.high}"
         value = self.value()
         shown = "table" if isinstance(value, list) else f"{value:.4g}"
         return f"{shown}: x {self.low:g} to x {self.high:g}"
@@ -86,8 +87,8 @@ UNCERTAIN = (
               why="from memory in the source list"),
     Uncertain(name="side by side", key="rotor.side_by_side_XSS", low=0.5, high=1.5, share=True,
               why="printed, without its origin"),
-    Uncertain(name="wake skew", key="rotor.white_blake_gradient", low=1.0, high=1.6,
-              why="White and Blake 1.41, Coleman 1, Pitt and Peters 1.47, Drees up to 1.6"),
+    Uncertain(name="wake skew", key="rotor.white_blake_gradient", low=1.0, high=1.47,
+              why="White and Blake 1.41; Coleman 1, Drees 1.33, Pitt and Peters 1.47"),
     Uncertain(name="gradient onset", key="rotor.white_blake_onset_advance_ratio", low=0.02, high=0.04,
               why="no source; chosen on the hover oscillations flown"),
     Uncertain(name="pylon K_PLAT", key="drag.pylon_k_plat", low=False, high=True, why="on this area inferred"),
