@@ -29,6 +29,7 @@ COMMAND_MODULES = (
     "fly",
     "replay",
     "analysis",
+    "rotor",
     "performance",
     "corridor",
     "pilot",
@@ -40,6 +41,7 @@ COMMAND_MODULES = (
     "campaign",
     "optimize",
     "reproduce",
+    "validate",
     "joystick",
 )
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
