@@ -25,7 +25,11 @@ _WHOLE = {
 _PARTS = {
     "engine_pylons": ("pylons", "pylon interference drag", "the interference drag is taken in another flow"),
     "hub_spinner": ("spinners", "spinner drag", "the drag is taken in another flow, or acts at another point"),
-    "jet": ("jets", "jet thrust of the engines", "a law in power and airspeed through these four numbers"),
+    "jet": (
+        "jets",
+        "jet thrust of the engines",
+        "a law in power and airspeed through these four numbers, at the model's own power",
+    ),
 }
 
 
