@@ -34,7 +34,7 @@ def test_both_plants_meet_the_ground_alike(name):
 
 
 def test_hover_on_the_wheels_takes_less_power():
-    """Power in ground effect over that out of it: 0.86 of the same weight (fitted to 1.11 of the weight at one power)."""
+    """Power in ground effect over that out of it, near 0.86 (fitted to 1.11 of the weight at one power)."""
     rows = flown("vertical_takeoff", "nonlinear")
     light, high = rows[0], rows[-1]
     assert light[COLUMN.ground_effect] == pytest.approx(0.93, abs=0.05)

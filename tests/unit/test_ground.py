@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -67,7 +69,7 @@ def test_ground_effect_is_one_on_the_wheels_and_fades():
     """1 hovering on the wheels; less with height, speed and tilt; nothing above 4.6 R. Height law: Hayden 1976."""
     assert kernels.ground_effect(GROUND, 0.0, deg(90.0), 0.0) == pytest.approx(1.0, abs=1e-12)
     heights = [kernels.ground_effect(GROUND, h, deg(90.0), 0.0) for h in (0.0, 1.0, 3.0, 8.0, 14.0)]
-    assert all(low > high for low, high in zip(heights, heights[1:], strict=False))
+    assert all(low > high for low, high in itertools.pairwise(heights))
     assert kernels.ground_effect(GROUND, 15.0, deg(90.0), 0.0) == 0.0
     assert kernels.ground_effect(GROUND, 0.0, deg(90.0), kt(26.0)) == pytest.approx(0.5)
     assert kernels.ground_effect(GROUND, 0.0, 0.0, 0.0) == 0.0
