@@ -18,7 +18,7 @@ SHIPPED_MASS = 13000.0 * POUND
 """Mass of the shipped aircraft [kg]."""
 _DIGITS = 3  # of the units people give them in: what was read back from a file is the same condition
 _UNITS = {"mass": POUND, "density_altitude": FOOT, "cg_forward": INCH}
-_STORED = {"mass": "mass_kg", "density_altitude": "density_altitude_m", "cg_forward": "cg_forward_m"}
+_STORED = {"mass": "weight_lb", "density_altitude": "density_altitude_ft", "cg_forward": "cg_in"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,12 +46,12 @@ class AircraftCondition:
         """
         if any(not isinstance(attributes.get(key), (int, float)) for key in _STORED.values()):
             return SHIPPED
-        return AircraftCondition(**{name: float(attributes[key]) for name, key in _STORED.items()})
+        return AircraftCondition(**{name: float(attributes[key]) * _UNITS[name] for name, key in _STORED.items()})
 
     @property
     def attributes(self) -> dict[str, float]:
         """The condition as attributes of a database."""
-        return {key: float(getattr(self, name)) for name, key in _STORED.items()}
+        return {key: round(getattr(self, name) / _UNITS[name], _DIGITS) for name, key in _STORED.items()}
 
     @property
     def density(self) -> float:

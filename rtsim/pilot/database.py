@@ -13,7 +13,7 @@ from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
 from rtsim.lpv.database import Database, PilotArrays
 from rtsim.pilot.schedule import design_schedule
 
-BUILD_SHARE = 0.35
+BUILD_SHARE = 0.3
 """Share of the work that trims and linear models are; the rest are the pilots."""
 
 

@@ -77,9 +77,7 @@ class Xv15:
     @property
     def airplane_rotor_speed(self) -> float:
         """Rotor speed of airplane mode [rad/s]."""
-        from rtsim.aircraft.xv15.data_reader import read_data
-
-        return float(rpm(read_data()[0]["rotor"]["rpm_airplane"]))
+        return _airplane_rotor_speed()
 
     def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
         """State derivative.
@@ -132,6 +130,14 @@ def _cached_tables() -> AircraftTables:
     return packed(kept("xv15", b"".join(path.read_bytes() for path in data), _plain_tables))
 
 
+@cache
+def _airplane_rotor_speed() -> float:
+    """Read once: a database asks for it at every trim."""
+    from rtsim.aircraft.xv15.data_reader import read_data
+
+    return float(rpm(read_data()[0]["rotor"]["rpm_airplane"]))
+
+
 @lru_cache(maxsize=8)
 def _conditioned_tables(condition: AircraftCondition) -> AircraftTables:
     from rtsim.aircraft.xv15.data_reader import read_data
@@ -141,7 +147,8 @@ def _conditioned_tables(condition: AircraftCondition) -> AircraftTables:
     changes |= {f"cg.{key}": centre[key] * share for key in ("shift_X_ft", "shift_Z_ft")}
     tables = Xv15.load(changes).tables
     density, sound_speed = standard_atmosphere(condition.density_altitude)
-    configuration = tables.configuration._replace(mass=condition.mass, density=density, sound_speed=sound_speed)
+    mass = tables.configuration.mass if condition.mass == SHIPPED.mass else condition.mass  # 13000.02 lb in the data
+    configuration = tables.configuration._replace(mass=mass, density=density, sound_speed=sound_speed)
     return tables._replace(configuration=configuration)
 
 

@@ -92,9 +92,9 @@ class Xv15Grid:
         configuration = self.aircraft.tables.configuration
         return {
             "title": "Bell XV-15, symmetric plane: trim map and linear models over the conversion corridor",
-            **self.condition.attributes,
             "mass_kg": float(configuration.mass),
             "air_density_kg_m3": float(configuration.density),
+            **self.condition.attributes,
             "source_sha256": source_sha256(),
             "rtsim_version": rtsim.__version__,
             "numpy_version": np.__version__,

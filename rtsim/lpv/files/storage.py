@@ -78,7 +78,7 @@ def _read(file: Path, beside: Path | None) -> Database:
         return _with_profile(database, read_profile(beside))
     if inside is not None:
         return _with_profile(database, parse_profile(str(inside), file=f"{file} ({PROFILE_ATTRIBUTE})"))
-    if file == SHIPPED or "cg_forward_m" in database.attributes:  # built here: the XV-15 at some condition
+    if file == SHIPPED or "cg_in" in database.attributes:  # built here: the XV-15 at some condition
         return _with_profile(database, xv15_profile())
     logging.getLogger(__name__).warning(
         "%s: has no aircraft profile: it flies with the XV-15's %s and %s.", file, ", ".join(PARTS[:-1]), PARTS[-1]
