@@ -22,8 +22,10 @@ AIRSPEED_RANGE = (kt(-40.0), kt(260.0))
 """Airspeeds a programme may ask for [m/s]: from rearward hover flight to the flaps-up limit on the downstop."""
 NACELLE_RANGE = (0.0, deg(90.0))
 """Nacelle angles a programme may ask for [rad]."""
-ALTITUDE_RANGE = (0.0, 10_000.0)
-"""Altitudes a programme may ask for [m]."""
+ALTITUDE_RANGE = (-5.0, 10_000.0)
+"""Altitudes a programme may ask for [m]; below 0 the pilot presses the wheels onto the ground."""
+START_ALTITUDE_RANGE = (0.0, 10_000.0)
+"""Altitudes at which a flight may start [m]."""
 MAX_NACELLE_RATE = deg(12.0)
 """Fastest nacelle motion that may be assigned [rad/s]; the pilot's switch is slower."""
 _ROUNDING = 1e-9

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.specification import AirSpecification, Turbulence
+from rtsim.drawing import BLUE, GREEN, ORANGE, PURPLE, RED, REPORT_STYLE
 from rtsim.loop.setup import FlightSetup
 from rtsim.loop.simulation import Simulation
 from rtsim.measures.metrics import FlightFigures, measured
@@ -31,7 +32,7 @@ from rtsim.optimization.spec import SearchSpec, checked_spec, spec_like
 from rtsim.pilot.weights import DisplaySettings, PilotSettings, pilot_settings
 from rtsim.programme import Programme
 from rtsim.units import deg
-from scenarios.reproduction.drawing import BLUE, GREEN, ORANGE, PURPLE, RED, STYLE, draw_corridor
+from scenarios.reproduction.drawing import draw_corridor
 from scenarios.reproduction.flights import BASELINE, Flight, Flyer, Variant
 
 HERE = Path(__file__).parent
@@ -370,7 +371,7 @@ def main() -> None:
     problem, result = searched(spec_like("typical"), records)
     paths = {name: paper_path(name) for name in PATH_NAMES}
     paths["optimum"] = dataclasses.replace(problem.path(result.best), name="optimum")
-    with rc_context(STYLE):
+    with rc_context(REPORT_STYLE):
         optimum_and_paths(paths)
         rates(paths["optimum"])
         accelerations()

@@ -30,6 +30,7 @@ COMMAND_MODULES = (
     "fly",
     "replay",
     "analysis",
+    "rotor",
     "performance",
     "corridor",
     "pilot",
@@ -41,6 +42,7 @@ COMMAND_MODULES = (
     "campaign",
     "optimize",
     "reproduce",
+    "validate",
     "joystick",
 )
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TextIO
 
 from rtsim.jsonable import to_jsonable
 
@@ -94,8 +94,20 @@ def emit_json(value: object) -> None:
     stream.flush()
 
 
+class Advance(Protocol):
+    """Moves a progress bar on."""
+
+    def __call__(self, amount: float, words: str = "") -> None:
+        """Add to what is done.
+
+        Args:
+            amount: The work done since the last call.
+            words: What is done now; empty leaves the words that stand there.
+        """
+
+
 @contextmanager
-def progress(description: str, *, total: float) -> Iterator[Callable[[float], None]]:
+def progress(description: str, *, total: float) -> Iterator[Advance]:
     """Show a progress bar with the time left on stderr while the block runs.
 
     Args:
@@ -103,7 +115,7 @@ def progress(description: str, *, total: float) -> Iterator[Callable[[float], No
         total: The amount of work, in the unit that ``advance`` counts.
 
     Yields:
-        ``advance(amount)``, to be called as work is done.
+        ``advance(amount)`` or ``advance(amount, words)``, to be called as work is done.
     """
     from rich.progress import (
         BarColumn,
@@ -123,4 +135,4 @@ def progress(description: str, *, total: float) -> Iterator[Callable[[float], No
     )
     with Progress(*columns, console=console.real(), transient=False) as bar:
         task = bar.add_task(description, total=total)
-        yield lambda amount: bar.advance(task, amount)
+        yield lambda amount, words="": bar.update(task, advance=amount, description=words or None)

@@ -150,7 +150,7 @@ def start_trim(
 
     Args:
         nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
-        held: Rotor speed [rad/s], and its place on the nacelle axis of the database [rad]; None: the conversion's.
+        held: Rotor speed [rad/s], and its place on the database's nacelle axis [rad]; None: the conversion's.
 
     Raises:
         InputError: There is no trim.

@@ -85,7 +85,7 @@ def gains_of(tables: PilotTables, cell: FloatArray) -> Gains:
 
 @inner_kernel
 def rates(
-    tables: PilotTables, gains: Gains, held: Held, at: Motion, frozen: bool, out: Motion, scratch: FloatArray
+    tables: PilotTables, gains: Gains, held: Held, at: Motion, holds: int, out: Motion, scratch: FloatArray
 ) -> None:
     """Rates of the pilot at held displays.
 
@@ -93,7 +93,7 @@ def rates(
         gains: Gains of this frame.
         held: What acts constantly.
         at: Estimate, hands and delay filter.
-        frozen: The integrals stand still.
+        holds: How many of the integrals stand still: none, that of the airspeed, both.
         out: Receives the rates.
         scratch: Room for the padded displays, the hands, and the states with a column.
     """
@@ -121,9 +121,8 @@ def rates(
         for hand in range(hands):
             total += gains.B[rows * hand + k] * values[roles.a_columns + hand]
         dx[k] = total
-    if frozen:
-        for k in range(n - INTEGRALS, n):
-            dx[k] = 0.0
+    for k in range(n - INTEGRALS, n - INTEGRALS + holds):
+        dx[k] = 0.0
     for k in range(delay):
         model = 0.0
         true = 0.0

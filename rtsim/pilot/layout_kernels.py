@@ -69,6 +69,10 @@ LARGEST_AIRSPEED_ERROR = 10.0
 """Farther from its reference the pilot gives the reference up and captures it again [m/s]."""
 LARGEST_ALTITUDE_ERROR = 20.0
 """The same for altitude [m]."""
+GIVE_WAY_TIME = 1.0
+"""Time in which the own airspeed reference goes to the airspeed that the power at hand allows [s]."""
+LEVER = 1
+"""The hand on the power lever."""
 OFFSETS = 4
 """Distance of the pilot's own reference from what is asked: airspeed, its rate, altitude, climb rate."""
 INTEGRALS = 2

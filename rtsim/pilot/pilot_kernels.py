@@ -42,9 +42,11 @@ from rtsim.pilot.layout_kernels import (
     CAPTURE_CLIMB_RATE,
     CAPTURE_FREQUENCY,
     DISPLAY,
+    GIVE_WAY_TIME,
     INTEGRALS,
     LARGEST_AIRSPEED_ERROR,
     LARGEST_ALTITUDE_ERROR,
+    LEVER,
     LOOP_INTEGRATORS,
     NUMBER,
     OFFSETS,
@@ -290,11 +292,14 @@ def mocm_advance_in(
     _outer_loops(tables, cell, held, trim, own, state[integrals_at : integrals_at + INTEGRALS])
     _known_accelerations(tables, cell, held, trim, own, pitch_rate, nacelle_rate)
     frozen = limit_hands(tables, gains, held, y, trim)
+    short = False
     for hand in range(hands):
         # what stops or protection did to the controls, the internal model is told
         overruled = applied[hand] - (trim[1 + hand] + demand(tables, state, hand))
         if abs(overruled) > SAME_CONTROL:
-            frozen = True
+            # Less power than asked for, and slower than wanted: the pilot is told, and lets the speed go.
+            short = short or (hand == LEVER and overruled < 0.0 and error_v < 0.0)
+            frozen = frozen or not (hand == LEVER and overruled < 0.0 and error_v < 0.0)
             for k in range(n):
                 held.plant[k] += gains.B[pad4(n) * hand + k] * overruled
     if noisy:
@@ -307,7 +312,9 @@ def mocm_advance_in(
                 held.motor[hand] += gains.G[hands * hand + other] * strength * noise[displays + other] * root
 
     # the pilot is linear over a held frame, so RK4 is the Taylor series to fourth order
-    holds = frozen and roles.loop == LOOP_INTEGRATORS
+    holds = 0
+    if roles.loop == LOOP_INTEGRATORS:
+        holds = INTEGRALS if frozen else 1 if short else 0
     factor = dt
     for order in range(1, 5):
         rates(tables, gains, held, y, holds, rate, scratch)
@@ -332,12 +339,17 @@ def mocm_advance_in(
         state[hands_at + hands + k] += total.d[k]
 
     if not frozen:
-        state[integrals_at] += dt * error_v
+        state[integrals_at] += 0.0 if short else dt * error_v
         state[integrals_at + 1] += dt * error_h
     # capture: lead the own reference on, and give it up where the aircraft is too far from it
-    _capture(state, offset_at, (CAPTURE_AIRSPEED_RATE, CAPTURE_AIRSPEED_JERK), dt)
+    if short:
+        speeding = tables.numbers[NUMBER.filter] * (airspeed - state[S_FILTERED]) / dt
+        state[offset_at + 1] += dt / GIVE_WAY_TIME * (speeding - own[TARGET.airspeed_rate])
+        state[offset_at] += dt * (state[offset_at + 1] + error_v / GIVE_WAY_TIME)
+    else:
+        _capture(state, offset_at, (CAPTURE_AIRSPEED_RATE, CAPTURE_AIRSPEED_JERK), dt)
     _capture(state, offset_at + 2, (CAPTURE_CLIMB, CAPTURE_CLIMB_RATE), dt)
     state[offset_at] += error_v - clip(error_v, LARGEST_AIRSPEED_ERROR)
     state[offset_at + 2] += error_h - clip(error_h, LARGEST_ALTITUDE_ERROR)
     state[S_FILTERED] += tables.numbers[NUMBER.filter] * (airspeed - state[S_FILTERED])
-    state[S_LIMITED] = 1.0 if frozen else 0.0
+    state[S_LIMITED] = 1.0 if frozen or short else 0.0

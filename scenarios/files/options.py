@@ -11,7 +11,7 @@ from rtsim.atmosphere.specification import Severity, Turbulence
 from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
 from rtsim.loop.options import declared
-from rtsim.programme import AIRSPEED_RANGE, ALTITUDE_RANGE, NACELLE_RANGE, Programme, ProgrammePoint
+from rtsim.programme import AIRSPEED_RANGE, NACELLE_RANGE, START_ALTITUDE_RANGE, Programme, ProgrammePoint
 from rtsim.units import kt, to_deg, to_kt
 from scenarios.files.loader import load_scenario, named_start
 from scenarios.files.scenario import DEFAULT_ALTITUDE, Scenario
@@ -108,7 +108,7 @@ def _start_point(overrides: Overrides, default: ProgrammePoint) -> ProgrammePoin
             mend="give either --start or --airspeed-kt and --nacelle-deg",
         )
     altitude = default.altitude if overrides.altitude is None else overrides.altitude
-    _check_range("--altitude-m", altitude, ALTITUDE_RANGE, "m")
+    _check_range("--altitude-m", altitude, START_ALTITUDE_RANGE, "m")
     if overrides.start is not None:
         return named_start(overrides.start, altitude=altitude)
     for option, value in (("--airspeed-kt", overrides.airspeed), ("--nacelle-deg", overrides.nacelle_angle)):
@@ -145,7 +145,7 @@ def _displaced(scenario: Scenario, overrides: Overrides) -> Scenario:
     if not overrides.moves_start:
         if overrides.altitude is None:
             return scenario
-        _check_range("--altitude-m", overrides.altitude, ALTITUDE_RANGE, "m")
+        _check_range("--altitude-m", overrides.altitude, START_ALTITUDE_RANGE, "m")
         return _raised(scenario, overrides.altitude - scenario.start.altitude)
     start = _start_point(overrides, scenario.start)
     if scenario.programme.duration == 0.0 and HAND_PILOT in {overrides.pilot, scenario.options.pilot}:

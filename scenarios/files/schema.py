@@ -26,6 +26,8 @@ FORMAT = 1
 AirspeedKt = Annotated[float, Field(ge=-40.0, le=260.0, allow_inf_nan=False)]
 NacelleDeg = Annotated[float, Field(ge=0.0, le=90.0, allow_inf_nan=False)]
 AltitudeM = Annotated[float, Field(ge=0.0, le=10_000.0, allow_inf_nan=False)]
+WantedAltitudeM = Annotated[float, Field(ge=-5.0, le=10_000.0, allow_inf_nan=False)]
+"""Below 0 the pilot presses the wheels onto the ground."""
 DurationS = Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
 AccelerationKtS = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 NacelleRateDegS = Annotated[float, Field(ge=0.1, le=12.0, allow_inf_nan=False)]
@@ -54,7 +56,7 @@ class PointTable(Strict):
 
     airspeed_kt: AirspeedKt
     nacelle_deg: NacelleDeg
-    altitude_m: AltitudeM | None = None
+    altitude_m: WantedAltitudeM | None = None
     time_s: DurationS | None = None
     acceleration_kt_s: AccelerationKtS | None = None
     nacelle_rate_deg_s: NacelleRateDegS | None = None

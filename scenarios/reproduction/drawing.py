@@ -5,45 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import load_corridor
-from rtsim.drawing import drawing
+from rtsim.drawing import BLUE, GREY, REPORT_STYLE, drawing, save_both
 from rtsim.optimization.path import ConversionPath
 from rtsim.units import deg, to_kt
-from rtsim.whole_file import whole_file
 from scenarios.reproduction.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BLUE, ORANGE, GREEN, PURPLE, GREY, RED = "#1f6fb4", "#d9730d", "#2a8c4a", "#8a3fa0", "#777777", "#c23b3b"
-"""Colours that stay apart in print and for most colour-blind readers."""
-FORMATS = ("svg", "png")
-"""Every figure is written in each of these."""
 FULL, HALF = (7.6, 4.6), (7.6, 3.4)
 """Sizes of figures [in]."""
-STYLE: dict[Any, Any] = {
-    "font.size": 10.0,
-    "axes.titlesize": 10.5,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "grid.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "lines.linewidth": 1.6,
-    "legend.frameon": False,
-    "legend.fontsize": 9.0,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "rtsim",
-}
-"""matplotlib settings of all figures."""
 _POINTS = 1500
 
 
@@ -188,19 +166,13 @@ def save_figures(
         OutputError: A picture cannot be written.
     """
     files: dict[int, list[Path]] = {}
-    with drawing(**STYLE):
+    with drawing(**REPORT_STYLE):
         from matplotlib.figure import Figure
 
         for plan in plans:
             figure = Figure(figsize=plan.size, layout="constrained")
             figure.suptitle(f"Figure {plan.number}. {plan.title}", x=0.01, ha="left", fontsize=10.5)
             plan.draw(study, figure)
-            files[plan.number] = []
-            for suffix in FORMATS:
-                path = directory / f"{plan.stem}.{suffix}"
-                metadata = {"Date": None} if suffix == "svg" else {"Software": None}
-                with whole_file(path) as temporary:
-                    figure.savefig(temporary, dpi=150, format=suffix, metadata=metadata)
-                files[plan.number].append(path)
+            files[plan.number] = list(save_both(figure, directory, plan.stem).values())
             drawn(1.0)
     return files

@@ -7,17 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rtsim.corridor.boundaries import load_corridor
+from rtsim.drawing import BLUE, GREEN, GREY, ORANGE, PURPLE, RED
 from rtsim.lpv.files.storage import load_database
 from rtsim.optimization.paths import trim_flapping_map
 from rtsim.units import to_deg, to_kt
 from scenarios.reproduction.drawing import (
-    BLUE,
-    GREEN,
-    GREY,
     HALF,
-    ORANGE,
-    PURPLE,
-    RED,
     FigurePlan,
     draw_corridor,
     draw_path,
