@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import logging
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,6 +27,9 @@ from rtsim.lpv.files.kept_databases import kept_file
 from rtsim.lpv.files.mat import read_mat, write_mat
 from rtsim.lpv.files.netcdf import SHIPPED, read_database, write_database
 from rtsim.outside import regular_file, status_of
+
+_LIBRARY = threading.Lock()
+"""HDF5 bears one thread at a time."""
 
 
 def load_database(path: str | Path | AircraftCondition | None = None) -> Database:
@@ -94,7 +98,8 @@ def _parsed(file: Path) -> Database:
         assert database.content_hash  # goes with it
         return database
 
-    database = kept("database", f"{file.resolve()} {_state(file)}".encode(), parse)
+    with _LIBRARY:
+        database = kept("database", f"{file.resolve()} {_state(file)}".encode(), parse)
     database.freeze()
     return database
 
@@ -124,4 +129,5 @@ def save_database(database: Database, path: str | Path) -> None:
     if Path(path).suffix.lower() == ".mat":
         write_mat(database, path)
         return
-    write_database(database, path)
+    with _LIBRARY:
+        write_database(database, path)

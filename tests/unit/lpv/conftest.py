@@ -31,7 +31,7 @@ class ToyAircraft:
     outputs: tuple = _variables(("load_factor", "thrust", "wing_angle_of_attack"))
     attributes: dict = field(default_factory=lambda: {"title": "toy"})
 
-    def rotor_speed(self, nacelle):
+    def rotor_speed(self, _nacelle):
         return 60.0
 
     def forces(self, x, u, n):
