@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from rtsim.aircraft.condition import SHIPPED, AircraftCondition
 from rtsim.aircraft.points import Condition
+from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.xv15.dynamics_kernels import gravity_centre
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.corridor.boundaries import load_corridor
@@ -25,6 +26,8 @@ from rtsim.lpv.database import Database
 from rtsim.lpv.files import kept_databases
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection.boundary import load_boundary
+from rtsim.systems.ground import load_ground_tables
+from rtsim.systems.ground_kernels import FORWARD
 from rtsim.units import FOOT, INCH, POUND, POUND_FORCE, deg, kt
 
 LIGHT_AND_HIGH = AircraftCondition(mass=11000.0 * POUND, density_altitude=4000.0 * FOOT, cg_forward=3.0 * INCH)
@@ -197,6 +200,14 @@ def toy() -> Database:
         pilot={},
         **{name: getattr(shipped, name)[:, speeds, angles] for name in arrays},
     )
+
+
+def test_the_weight_stands_on_the_wheels():
+    usual, other = (load_ground_tables(xv15_profile(), Xv15.under(c).tables) for c in (SHIPPED, LIGHT_AND_HIGH))
+    assert other.mass == LIGHT_AND_HIGH.mass
+    np.testing.assert_allclose(other.wheels[:, FORWARD] - usual.wheels[:, FORWARD], -3.0 * INCH, atol=1e-9)
+    np.testing.assert_allclose(other.wheels[:, 2].sum() / usual.wheels[:, 2].sum(), 11.0 / 13.0, rtol=0.02)
+    assert other.wheels[0, 2] / other.wheels[1, 2] > usual.wheels[0, 2] / usual.wheels[1, 2]  # more on the nose
 
 
 def test_grid_says_its_condition():

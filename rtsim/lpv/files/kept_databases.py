@@ -17,8 +17,8 @@ from rtsim.aircraft.condition import AircraftCondition
 from rtsim.errors import OutputError
 from rtsim.kernels import store
 
-BUILT_FROM = ("aircraft", "lpv", "nacelle", "pilot")
-"""Parts of rtsim whose sources and data a database is made from, besides the kernels, which name the folder."""
+BUILT_FROM = ("aircraft/**/*", "lpv/*", "lpv/building/*", "nacelle/*", "pilot/*")
+"""Sources and data in rtsim that a database is made from, besides the kernels, which name the folder."""
 
 
 def kept_file(condition: AircraftCondition) -> Path | None:
@@ -54,7 +54,7 @@ def _name(condition: AircraftCondition) -> str:
 def _recipe() -> str:
     """Hash of everything a database is built from."""
     root, digest = Path(__file__).resolve().parents[2], hashlib.sha256()
-    files = (path for part in BUILT_FROM for ending in ("py", "toml") for path in (root / part).rglob(f"*.{ending}"))
+    files = (path for part in BUILT_FROM for ending in ("py", "toml") for path in root.glob(f"{part}.{ending}"))
     for path in sorted(files):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
