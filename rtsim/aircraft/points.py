@@ -22,9 +22,9 @@ class Condition:
     rotor_speed: float | None = None
     """Rotor speed [rad/s]; None: 589 rpm."""
     mass: float | None = None
-    """Mass [kg]; None: 13000 lb."""
-    pressure_altitude: float = 0.0
-    """Height in the standard atmosphere [m]."""
+    """Mass [kg]; None: the aircraft's own."""
+    pressure_altitude: float | None = None
+    """Height in the standard atmosphere [m]; None: the aircraft's own air."""
 
 
 @dataclass(frozen=True, slots=True)

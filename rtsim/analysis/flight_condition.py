@@ -17,6 +17,7 @@ from rtsim.errors import InputError, TrimError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from rtsim.aircraft.condition import AircraftCondition
     from rtsim.aircraft.points import Condition, TrimPoint
     from rtsim.aircraft.profile import AircraftProfile
     from rtsim.aircraft.variables import Variable
@@ -47,12 +48,22 @@ class AskedCondition:
     """Level acceleration; None: none."""
     database: Path | None
     """Database file; None: the shipped one."""
+    density_altitude_ft: float | None = None
+    """Density altitude, in place of the pressure altitude; None: sea level."""
+    cg_in: float | None = None
+    """Centre of gravity forward of the aft limit; None: at it."""
 
     @property
     def solves_nonlinear(self) -> bool:
         """Whether the nonlinear model must be solved: the database holds one condition only."""
-        asked = (self.flap_deg, self.rotor_rpm, self.weight_lb, self.altitude_m, self.acceleration_kt_s)
-        return self.nonlinear or any(value is not None for value in asked)
+        asked = (self.flap_deg, self.rotor_rpm, self.acceleration_kt_s)
+        return self.nonlinear or self.asks_condition or any(value is not None for value in asked)
+
+    @property
+    def asks_condition(self) -> bool:
+        """Whether weight, air or centre of gravity were asked for."""
+        asked = (self.weight_lb, self.altitude_m, self.density_altitude_ft, self.cg_in)
+        return any(value is not None for value in asked)
 
 
 _LIMITS: tuple[tuple[str, float, float, str], ...] = (
@@ -63,6 +74,8 @@ _LIMITS: tuple[tuple[str, float, float, str], ...] = (
     ("weight_lb", 5000.0, 20000.0, "lb"),
     ("altitude_m", -1000.0, 11000.0, "m"),
     ("acceleration_kt_s", -20.0, 20.0, "kn/s"),
+    ("density_altitude_ft", -3000.0, 36000.0, "ft"),
+    ("cg_in", 0.0, 9.4, "in"),
 )
 
 
@@ -135,6 +148,8 @@ def checked(request: AskedCondition) -> AskedCondition:
                 allowed=f"{low:g} to {high:g} {unit}",
                 mend="choose a value in this range",
             )
+    if request.altitude_m is not None and request.density_altitude_ft is not None:
+        raise InputError("says the same as --altitude-m", key="--density-altitude-ft", mend="give one of the two")
     return request
 
 
@@ -166,7 +181,7 @@ def checked_outer_loop(outer_loop: str) -> OuterLoop:
 
 def _condition(request: AskedCondition) -> Condition:
     from rtsim.aircraft.points import Condition
-    from rtsim.units import deg, kt, lb, rpm
+    from rtsim.units import deg, kt, rpm
 
     return Condition(
         airspeed=kt(request.airspeed_kt),
@@ -174,9 +189,23 @@ def _condition(request: AskedCondition) -> Condition:
         acceleration=kt(request.acceleration_kt_s or 0.0),
         flap=None if request.flap_deg is None else deg(request.flap_deg),
         rotor_speed=None if request.rotor_rpm is None else rpm(request.rotor_rpm),
-        mass=None if request.weight_lb is None else lb(request.weight_lb),
-        pressure_altitude=request.altitude_m or 0.0,
     )
+
+
+def _asked_aircraft(request: AskedCondition) -> AircraftCondition:
+    """Weight, air and centre of gravity: those of the database where nothing else is asked for."""
+    from rtsim.aircraft.condition import SHIPPED, AircraftCondition
+    from rtsim.units import FOOT, INCH, lb
+
+    base = SHIPPED if request.database is None else AircraftCondition.stored(_lpv(request).database.attributes)
+    changes = {
+        "mass": None if request.weight_lb is None else lb(request.weight_lb),
+        "density_altitude": request.altitude_m,
+        "cg_forward": None if request.cg_in is None else request.cg_in * INCH,
+    }
+    if request.density_altitude_ft is not None:
+        changes["density_altitude"] = request.density_altitude_ft * FOOT
+    return dataclasses.replace(base, **{name: value for name, value in changes.items() if value is not None})
 
 
 def nonlinear_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
@@ -191,7 +220,7 @@ def nonlinear_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.units import to_deg, to_rpm
 
-    aircraft = Xv15.load()
+    aircraft = Xv15.under(_asked_aircraft(request))
     condition = _condition(request)
     point = aircraft.trim(condition)
     tables = aircraft.tables
@@ -242,7 +271,7 @@ def solvable(request: AskedCondition) -> AskedCondition:
             raise InputError(
                 f"there is no nonlinear model of the {profile.name}",
                 key="--nonlinear",
-                mend="leave it out, and flaps, rotor speed, weight, altitude and acceleration too",
+                mend="leave it out, and flaps, rotor speed, weight, altitude, centre of gravity and acceleration too",
             )
         return request
     if request.solves_nonlinear:
@@ -282,6 +311,7 @@ def _trim_result(
     from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, to_deg
 
     flap_deg, rotor_rpm = configuration
+    corridor = load_corridor("design", profile).in_true_airspeed(_asked_aircraft(request).true_over_calibrated)
     solved = {
         "pitch_deg": to_deg(values["pitch"]),
         "stick_in": values["stick"] * _stick_travel(profile),
@@ -304,7 +334,7 @@ def _trim_result(
         **(solved if converged else dict.fromkeys(solved)),
         "converged": converged,
         "beyond_limits": _beyond_limits(solved, profile) if converged else [],
-        "inside_corridor": load_corridor("design", profile).inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
+        "inside_corridor": corridor.inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
         "source": "nonlinear" if request.solves_nonlinear else "database",
     }
 
@@ -349,7 +379,7 @@ def nonlinear_model(request: AskedCondition) -> dict[str, Any]:
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.lpv.building.xv15_grid import flown_model
 
-    aircraft, condition = Xv15.load(), _condition(request)
+    aircraft, condition = Xv15.under(_asked_aircraft(request)), _condition(request)
     point = aircraft.trim(condition)
     if not point.converged:
         raise no_trim(request, point)
@@ -399,7 +429,8 @@ def closed_loop_model(request: AskedCondition, outer_loop: str) -> dict[str, Any
         raise InputError(
             "the pilot is designed for the database's own condition",
             key="--closed-loop",
-            mend="leave out --nonlinear, flaps, rotor speed, weight, altitude and acceleration",
+            mend="leave out --nonlinear, flaps, rotor speed, weight, altitude, centre of gravity and acceleration; "
+            "--database names one for another condition",
         )
     chosen = checked_outer_loop(outer_loop)
     aircraft = _lpv(request)

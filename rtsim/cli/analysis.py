@@ -29,6 +29,8 @@ _FLAP = typer.Option(help="Flap deflection [deg]; solves the nonlinear model.")
 _RPM = typer.Option(help="Rotor speed [rpm]; solves the nonlinear model.")
 _WEIGHT = typer.Option(help="Weight [lb]; solves the nonlinear model.")
 _ALTITUDE = typer.Option(help="Pressure altitude [m], standard atmosphere; solves the nonlinear model.")
+_DENSITY = typer.Option(help="Density altitude [ft], the same as --altitude-m; solves the nonlinear model.")
+_CENTRE = typer.Option(help="Centre of gravity forward of its aft limit [in]; solves the nonlinear model.")
 _ACCELERATION = typer.Option(help="Acceleration in level flight [kn/s]; solves the nonlinear model.")
 _DATABASE = typer.Option(help="Another LPV database than the shipped one (.nc or .mat).")
 _CLOSED_LOOP = typer.Option("--closed-loop", help="Aircraft, pilot and outer loops together, sampled as flown.")
@@ -51,19 +53,21 @@ def trim_command(
     rotor_rpm: Annotated[float | None, _RPM] = None,
     weight_lb: Annotated[float | None, _WEIGHT] = None,
     altitude_m: Annotated[float | None, _ALTITUDE] = None,
+    density_altitude_ft: Annotated[float | None, _DENSITY] = None,
+    cg_in: Annotated[float | None, _CENTRE] = None,
     acceleration_kt_s: Annotated[float | None, _ACCELERATION] = None,
     database: Annotated[Path | None, _DATABASE] = None,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Show one trim point: attitude, controls, loads and power in level flight.
 
-    From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m and
-    --acceleration-kt-s, solved by the nonlinear model at exactly that condition. At the edge of what the database
-    covers, where one of the grid points around has no trim, the nonlinear model is asked too.
+    From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m,
+    --density-altitude-ft, --cg-in and --acceleration-kt-s, solved by the nonlinear model at exactly that condition. At
+    the edge of what the database covers, where a grid point around has no trim, the nonlinear model is asked too.
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
-                       acceleration_kt_s, database)
+                       acceleration_kt_s, database, density_altitude_ft, cg_in)
     )  # fmt: skip
     request = solvable(request)
     result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
@@ -86,6 +90,8 @@ def linearize_command(
     rotor_rpm: Annotated[float | None, _RPM] = None,
     weight_lb: Annotated[float | None, _WEIGHT] = None,
     altitude_m: Annotated[float | None, _ALTITUDE] = None,
+    density_altitude_ft: Annotated[float | None, _DENSITY] = None,
+    cg_in: Annotated[float | None, _CENTRE] = None,
     acceleration_kt_s: Annotated[float | None, _ACCELERATION] = None,
     database: Annotated[Path | None, _DATABASE] = None,
     closed_loop: Annotated[bool, _CLOSED_LOOP] = False,
@@ -94,13 +100,14 @@ def linearize_command(
 ) -> None:
     """Show one linear model: matrices with named states, inputs and outputs, and the eigenvalues.
 
-    From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m and
-    --acceleration-kt-s, from the nonlinear model trimmed at exactly that condition. With --closed-loop, aircraft, pilot
-    and outer loops as flown: A is the map over one 4 ms frame, and the eigenvalues are log(z)/dt.
+    From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m,
+    --density-altitude-ft, --cg-in and --acceleration-kt-s, from the nonlinear model trimmed at exactly that condition.
+    With --closed-loop, aircraft, pilot and outer loops as flown: A is the map over one 4 ms frame, and the eigenvalues
+    are log(z)/dt.
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
-                       acceleration_kt_s, database)
+                       acceleration_kt_s, database, density_altitude_ft, cg_in)
     )  # fmt: skip
     checked_outer_loop(outer_loop)
     if closed_loop:

@@ -17,6 +17,7 @@ from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
 from rtsim.jsonable import to_jsonable
+from rtsim.loop.options import CONDITION
 from rtsim.whole_file import check_writable, whole_file, write_whole
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def register(app: typer.Typer) -> None:
     app.command("campaign")(run_campaign_command)
 
 
-@takes_options("plant", "database", "rate_hz", own="the file's")
+@takes_options("plant", "database", *CONDITION, "rate_hz", own="the file's")
 def run_campaign_command(
     spec: Annotated[str, typer.Argument(help="Campaign that comes with rtsim (misuse, nominal) or a .toml file.")],
     *,

@@ -8,12 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, results
 from rtsim.drawing import check_picture, drawing
 from rtsim.errors import InputError
+from rtsim.loop.options import CONDITION, FlightOptions
 from rtsim.whole_file import check_writable, whole_file
 
 if TYPE_CHECKING:
+    from rtsim.aircraft.condition import AircraftName
     from rtsim.command import Margins
     from rtsim.corridor.boundaries import Boundary, Corridor
 
@@ -26,6 +29,7 @@ def register(app: typer.Typer) -> None:
     app.command("corridor")(corridor_command)
 
 
+@takes_options("database", *CONDITION, own="that of the shipped aircraft")
 def corridor_command(
     *,
     corridor: Annotated[
@@ -36,9 +40,7 @@ def corridor_command(
     consistency: Annotated[
         bool, typer.Option("--consistency", help="Say where the corridor allows what the aircraft cannot trim.")
     ] = False,
-    database: Annotated[
-        Path | None, typer.Option(help="Another aircraft than the shipped XV-15: its LPV database (.nc, .mat).")
-    ] = None,
+    options: dict[str, Any],
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
     plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
 ) -> None:
@@ -50,19 +52,20 @@ def corridor_command(
     from rtsim.units import deg, kt
 
     point = _point(airspeed_kt, nacelle_deg)
-    if corridor == "model" or database is not None:
-        from rtsim.lpv.files.storage import load_database
+    flown = FlightOptions().changed(options)
+    if corridor == "model" or flown.database:
+        from rtsim.loop.aircraft import database_of
         from rtsim.protection.boundary import load_boundary
 
-        chosen = load_boundary(corridor, load_database(database))
+        chosen = load_boundary(corridor, database_of(flown.aircraft))
     else:
-        chosen = load_corridor(corridor)
+        chosen = load_corridor(corridor).in_true_airspeed(flown.condition.true_over_calibrated)
     result: dict[str, Any] = {"corridor_name": chosen.name, "boundaries": _boundaries(chosen)}
     if point is not None:
         margins = chosen.margins(kt(point[0]), deg(point[1]))
         result |= _point_result(chosen, point, margins)
     if consistency:
-        result["consistency"] = _inconsistencies(chosen, database)
+        result["consistency"] = _inconsistencies(chosen, flown.aircraft)
     if plot is not None:
         _draw(chosen, point, plot)
         result["plot_file"] = str(plot)
@@ -79,9 +82,9 @@ def corridor_command(
         console.print(f"Drew {plot}")
 
 
-def _inconsistencies(corridor: Corridor, database: Path | None) -> list[dict[str, Any]]:
+def _inconsistencies(corridor: Corridor, aircraft: AircraftName) -> list[dict[str, Any]]:
     """Stretches where the corridor is wider than the level trims of the aircraft within their limits."""
-    from rtsim.lpv.files.storage import load_database
+    from rtsim.loop.aircraft import database_of
     from rtsim.protection.boundary import check_consistency
     from rtsim.units import to_deg, to_kt
 
@@ -94,7 +97,7 @@ def _inconsistencies(corridor: Corridor, database: Path | None) -> list[dict[str
             "nacelle_deepest_deg": round(to_deg(found.nacelle_deepest), _DIGITS),
             "sentence": found.sentence(),
         }
-        for found in check_consistency(corridor, load_database(database))
+        for found in check_consistency(corridor, database_of(aircraft))
     ]
 
 

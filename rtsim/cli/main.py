@@ -16,6 +16,7 @@ import typer
 
 from rtsim import __version__
 from rtsim.cli import stopping
+from rtsim.cli.build_text import build_notice
 from rtsim.cli.compile_text import compile_notice
 from rtsim.cli.output import machine_output
 from rtsim.cli.surroundings import leave_settings_of_others
@@ -184,7 +185,7 @@ def _invoke(arguments: Sequence[str] | None) -> int:
     command = typer.main.get_command(build_app())
     try:
         words = sys.argv[1:] if arguments is None else arguments
-        with compile_notice(), machine_output() if "--json" in words else nullcontext():
+        with compile_notice(), build_notice(), machine_output() if "--json" in words else nullcontext():
             result = command.main(args=arguments, prog_name="rtsim", standalone_mode=False)
     except SystemExit as end:
         # The parser turns a broken pipe into exit 1, which is our code for a failed expectation.

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import InputError
+from rtsim.loop.options import CONDITION, FlightOptions
 from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import numpy as np
     import numpy.typing as npt
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 _SUFFIXES = (".nc", ".mat")
 _JOBS = 2
-_PILOT_FORMS = 2
-_BUILD_SHARE, _PILOT_SHARE = 0.2, 0.4  # of the work: the trims and models, and each of the two pilot forms
 
 
 def register(app: typer.Typer) -> None:
@@ -41,53 +39,40 @@ def _group() -> None:
     """The LPV database: trim map, linear models and pilot gains."""
 
 
+@takes_options(*CONDITION, own="the shipped one's")
 def build_command(
     *,
-    out: Annotated[Path | None, typer.Option(help="File to write; the default is the shipped database.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="File to write.",
+            show_default="the shipped database; at another condition the place where flights look for it",
+        ),
+    ] = None,
+    options: dict[str, Any],
     jobs: Annotated[int, typer.Option(help="Processes to use.", min=1, max=64)] = _JOBS,
     without_pilot: Annotated[bool, typer.Option("--without-pilot", help="Leave the pilot's gains out.")] = False,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
     """Build the database from the nonlinear model: trims, linear models, and the pilot's gains at every grid point."""
+    from rtsim.aircraft.condition import SHIPPED as SHIPPED_CONDITION
+    from rtsim.lpv.files.kept_databases import place_for
     from rtsim.lpv.files.netcdf import SHIPPED
     from rtsim.lpv.files.storage import save_database
+    from rtsim.pilot.database import build_xv15
 
-    target = out if out is not None else SHIPPED
+    condition = FlightOptions().changed(options).condition
+    target = out if out is not None else SHIPPED if condition == SHIPPED_CONDITION else place_for(condition)
     _require_suffix(target)
     check_writable(target)
     with progress("Solving trims and linear models", total=1.0) as advance:
-        database = _built(jobs, without_pilot, advance)
+        database = build_xv15(condition, jobs=jobs, pilots=not without_pilot, progress=advance)
     save_database(database, target)
     result = {"file": str(target), **summary(database)}
     if json:
         emit_json(result)
     else:
         _print_summary(result)
-
-
-def _built(jobs: int, without_pilot: bool, advance: Callable[[float], None]) -> Database:
-    from rtsim.lpv.building.build import build_database
-    from rtsim.lpv.building.grid import conversion_grid
-    from rtsim.lpv.building.xv15_grid import Xv15Grid
-
-    share = 1.0 if without_pilot else _BUILD_SHARE
-    database = build_database(Xv15Grid(), conversion_grid(), jobs=jobs, progress=lambda part: advance(share * part))
-    return database if without_pilot else _with_pilots(database, jobs, lambda part: advance(_PILOT_SHARE * part))
-
-
-def _with_pilots(database: Database, jobs: int, advance: Callable[[float], None]) -> Database:
-    """Design the MOCM in all its forms; each tells its progress from 0 to 1."""
-    from rtsim.choices import OUTER_LOOPS
-    from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
-    from rtsim.lpv.database import PilotArrays
-    from rtsim.pilot.schedule import design_schedule
-
-    for outer_loop in OUTER_LOOPS:
-        pilot = design_schedule(database, outer_loop=outer_loop, jobs=jobs, progress=advance)
-        stored = pilot.to_arrays()
-        rounded = {name: round_mantissa(array, JACOBIAN_BITS) for name, array in stored.arrays.items()}
-        database = database.with_pilot(outer_loop, PilotArrays(rounded, stored.attributes))
-    return database
 
 
 def info_command(
@@ -146,8 +131,10 @@ def import_command(
     check_writable(target)
     database = load_database(file)
     if design_pilots:
+        from rtsim.pilot.database import with_pilots
+
         with progress("Designing the pilots", total=1.0) as advance:
-            database = _with_pilots(database, _JOBS, lambda part: advance(part / _PILOT_FORMS))
+            database = with_pilots(database, jobs=_JOBS, progress=advance)
     save_database(database, target)
     result = {"file": str(target), **summary(database)}
     if json:
@@ -197,9 +184,9 @@ def summary(database: Database) -> dict[str, Any]:
 def _inside_corridor(database: Database) -> npt.NDArray[np.bool_]:
     import numpy as np
 
-    from rtsim.corridor.boundaries import load_corridor
+    from rtsim.protection.boundary import load_boundary
 
-    corridor = load_corridor("design", database.profile)
+    corridor = load_boundary("design", database)
     # 1e-6 m/s: a grid point on the boundary is inside whatever the rounding
     rows = [
         [corridor.low_speed(n) - 1e-6 <= v <= corridor.high_speed(n) + 1e-6 for n in database.nacelle]

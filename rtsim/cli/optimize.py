@@ -13,6 +13,7 @@ from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import InputError
+from rtsim.loop.options import CONDITION, declared
 from rtsim.whole_file import check_writable, write_whole
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def register(app: typer.Typer) -> None:
     app.command("optimize")(optimize_command)
 
 
-@takes_options("database", own=_OWN)
+@takes_options("database", *CONDITION, own=_OWN)
 def optimize_command(
     spec: Annotated[
         Path | None, typer.Argument(help="Specification (TOML).", show_default="the paper's search")
@@ -84,7 +85,7 @@ def optimize_command(
         "search.method": method,
         "search.handling": handling,
         "robust.flights": robust,
-        "flight.database": options.get("database"),
+        **{f"flight.{declared()[name].key}": declared()[name].shown(value) for name, value in options.items()},
     }
     chosen = _specification(spec, like, {key: value for key, value in changes.items() if value is not None})
     scenario_file = out if out is not None else Path(f"{chosen.name}.toml")

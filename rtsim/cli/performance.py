@@ -33,7 +33,13 @@ def register(app: typer.Typer) -> None:
 def performance_command(
     *,
     weight_lb: Annotated[float, typer.Option(help="Weight [lb].")] = 13_000.0,
-    altitude_ft: Annotated[float, typer.Option(help="Pressure altitude of climb and level flight [ft].")] = 0.0,
+    altitude_ft: Annotated[
+        float,
+        typer.Option(
+            "--altitude-ft", "--density-altitude-ft", help="Altitude of climb and level flight, standard day [ft]."
+        ),
+    ] = 0.0,
+    cg_in: Annotated[float, typer.Option(help="Centre of gravity forward of its aft limit [in].")] = 0.0,
     rotor_rpm: Annotated[
         float | None, typer.Option(help="Rotor speed [rpm].", show_default="589, and 517 at nacelle 0")
     ] = None,
@@ -56,6 +62,7 @@ def performance_command(
     for key, value, low, high, unit in (
         ("--weight-lb", weight_lb, 5000.0, 20000.0, "lb"),
         ("--altitude-ft", altitude_ft, -3000.0, 36000.0, "ft"),
+        ("--cg-in", cg_in, 0.0, 9.4, "in"),
         ("--rotor-rpm", rotor_rpm, 400.0, 700.0, "rpm"),
     ):
         if value is not None and not low <= value <= high:
@@ -63,7 +70,7 @@ def performance_command(
     if rating is not None and rating not in get_args(EngineRating):
         allowed = ", ".join(get_args(EngineRating))
         raise InputError("is not a rating", key="--rating", value=rating, allowed=allowed, mend="choose one")
-    result = _figures(weight_lb, altitude_ft, rotor_rpm, rating)  # type: ignore[arg-type]  # one of these, just checked
+    result = _figures(weight_lb, altitude_ft, cg_in, rotor_rpm, rating)  # type: ignore[arg-type]  # one of these, just checked
     if json:
         emit_json(result)
     else:
@@ -71,16 +78,17 @@ def performance_command(
 
 
 def _figures(
-    weight_lb: float, altitude_ft: float, rotor_rpm: float | None, rating: EngineRating | None
+    weight_lb: float, altitude_ft: float, cg_in: float, rotor_rpm: float | None, rating: EngineRating | None
 ) -> dict[str, Any]:
+    from rtsim.aircraft.condition import AircraftCondition
     from rtsim.aircraft.points import Condition
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.analysis.performance import best_climb, hover_ceiling, level_speed
     from rtsim.systems.engine import power_available
-    from rtsim.units import FOOT, deg, kt, lb, rpm, to_kt, to_rpm
+    from rtsim.units import FOOT, INCH, deg, kt, lb, rpm, to_kt, to_rpm
 
-    aircraft, altitude = Xv15.load(), altitude_ft * FOOT
-    mass = lb(weight_lb)
+    mass, altitude = lb(weight_lb), altitude_ft * FOOT
+    aircraft = Xv15.under(AircraftCondition(mass=mass, cg_forward=cg_in * INCH))
     full = aircraft.tables.configuration.rotor_speed if rotor_rpm is None else rpm(rotor_rpm)
     hover = hover_ceiling(aircraft, mass=mass, rotor_speed=full, rating=rating or "takeoff")
     climbs, speeds = [], []
@@ -106,7 +114,7 @@ def _figures(
              "limit": fast.limit, **_burned(fast, condition)}
         )  # fmt: skip
     return {
-        "weight_lb": weight_lb, "altitude_ft": altitude_ft,
+        "weight_lb": weight_lb, "altitude_ft": altitude_ft, "cg_in": cg_in,
         "hover_ceiling": {
             "rotor_rpm": to_rpm(full), "rating": rating or "takeoff", "altitude_ft": _number(hover.value / FOOT),
             "limit": hover.limit,
@@ -124,7 +132,7 @@ def _burned(fast: Reached, condition: Condition) -> dict[str, float | None]:
     if fast.point is None or math.isnan(fast.value):
         return {"power_shp": None, "fuel_flow_lb_h": None}
     shaft = float(fast.point.y[OUTPUT.power])
-    flow = fuel_flow(shaft, condition.pressure_altitude) / POUND_FORCE * 3600.0
+    flow = fuel_flow(shaft, condition.pressure_altitude or 0.0) / POUND_FORCE * 3600.0
     return {"power_shp": shaft / HORSEPOWER, "fuel_flow_lb_h": flow}
 
 

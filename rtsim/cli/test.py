@@ -10,6 +10,7 @@ import typer
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, RtsimError
+from rtsim.loop.options import CONDITION
 from rtsim.whole_file import check_writable, write_whole
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ def register(app: typer.Typer) -> None:
     app.command("test")(run_tests)
 
 
-@takes_options("plant", "database", "rate_hz", own="each scenario's")
+@takes_options("plant", "database", *CONDITION, "rate_hz", own="each scenario's")
 def run_tests(
     paths: Annotated[
         list[str] | None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -88,6 +88,21 @@ class Corridor:
     """High-speed side on the downstop [m/s]."""
     levels: Levels
     """Warning levels of its margins."""
+
+    def in_true_airspeed(self, factor: float) -> Corridor:
+        """The same corridor for true airspeeds: the charts are in calibrated airspeed.
+
+        Args:
+            factor: True airspeed over calibrated airspeed in the air that is flown in.
+        """
+        if factor == 1.0:
+            return self
+        return replace(
+            self,
+            low=replace(self.low, speed=self.low.speed * factor),
+            high=replace(self.high, speed=self.high.speed * factor),
+            downstop_speed=self.downstop_speed * factor,
+        )
 
     def low_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
         """Lowest allowed airspeed, signed [m/s].

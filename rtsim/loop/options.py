@@ -14,14 +14,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
+from rtsim.aircraft.condition import SHIPPED, AircraftCondition, AircraftName
 from rtsim.choices import BUILT_IN_PILOT, HAND_PILOT, PASSIVE_LAWS, AidName, CorridorName, OuterLoop, PlantName
 from rtsim.errors import InputError, suggestion
-from rtsim.units import KNOT, POUND_FORCE, RPM
+from rtsim.units import FOOT, INCH, KNOT, POUND, POUND_FORCE, RPM
 
 FULL_ROTOR_SPEED = 589.0 * RPM
 """Rotor speed of a flight that is asked for none: the XV-15's in conversion, and another aircraft's own [rad/s]."""
 FULL_TANKS = 1490.0 * POUND_FORCE
 """Fuel of a flight that is asked for none: the XV-15's full tanks, and another aircraft's own [N]."""
+CONDITION = ("mass", "density_altitude", "cg_forward")
+"""Options that are the condition of the aircraft."""
+CONDITION_FLAGS = "--weight-lb, --density-altitude-ft, --cg-in"
 _PLUG_IN = r"[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?"
 
 Campaign = Literal["file", "classes", "own"]
@@ -218,6 +222,42 @@ class FlightOptions:
         page="lpv.md",
         campaign="file",
     )
+    mass: float = option(
+        SHIPPED.mass,
+        help="Weight of the XV-15; its database for it is built once, then kept.",
+        panel="Who flies what",
+        key="weight_lb",
+        unit="lb",
+        factor=POUND,
+        low=9000.0,
+        high=15000.0,
+        page="lpv.md",
+        campaign="file",
+    )
+    density_altitude: float = option(
+        0.0,
+        help="Air of the flight: that of the standard day at this height, all the way up and down.",
+        panel="Who flies what",
+        key="density_altitude_ft",
+        unit="ft",
+        factor=FOOT,
+        low=-2000.0,
+        high=15000.0,
+        page="lpv.md",
+        campaign="file",
+    )
+    cg_forward: float = option(
+        0.0,
+        help="Centre of gravity forward of its aft limit.",
+        panel="Who flies what",
+        key="cg_in",
+        unit="in",
+        factor=INCH,
+        low=0.0,
+        high=9.4,
+        page="lpv.md",
+        campaign="file",
+    )
     aids: tuple[AidName, ...] = option(
         (),
         help="Pilot aids on at the start, separated by commas; they act on every pilot but the MOCM.",
@@ -315,6 +355,34 @@ class FlightOptions:
     def mocm_begins(self) -> bool:
         """Whether the virtual pilot flies at frame 0: he also holds the start for a person behind MAVLink."""
         return self.pilot in {BUILT_IN_PILOT, HAND_PILOT}
+
+    @property
+    def condition(self) -> AircraftCondition:
+        """Weight, air and centre of gravity that are asked for."""
+        return AircraftCondition(mass=self.mass, density_altitude=self.density_altitude, cg_forward=self.cg_forward)
+
+    @property
+    def condition_shown(self) -> dict[str, float]:
+        """That by key, in the units people give it in."""
+        return {declared()[name].key: declared()[name].shown(getattr(self, name)) for name in CONDITION}
+
+    @property
+    def aircraft(self) -> AircraftName:
+        """What names the aircraft: the file of its database, empty for the shipped one, or a condition.
+
+        Raises:
+            InputError: A database is named, and a condition besides that of the shipped one.
+        """
+        if self.condition == SHIPPED:
+            return self.database
+        if self.database:
+            raise InputError(
+                "cannot be flown with a database of its own: that is for one weight, air and centre of gravity",
+                key=CONDITION_FLAGS,
+                value=str(self.condition),
+                mend="leave one of the two out, or build the database for it (rtsim model build)",
+            )
+        return self.condition
 
     def changed(self, changes: Mapping[str, Any]) -> FlightOptions:
         """The options with some replaced.

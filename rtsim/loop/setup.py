@@ -12,6 +12,7 @@ import numpy as np
 
 from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVERNOR, MEMORY
 from rtsim.aids.design import design_aids, switches_of
+from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.controls import control_tables
 from rtsim.aircraft.points import Condition
 from rtsim.aircraft.variables import FLAP_INPUTS, GROUND_INPUTS, INPUTS, OUTPUTS, STATE, STATES, of_role
@@ -31,6 +32,7 @@ from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.packed import Address, packed
 from rtsim.loop import beside
 from rtsim.loop import frame_kernels as frames_of
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.data import (
     CHANNEL,
     CLOCK,
@@ -51,7 +53,6 @@ from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
-from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database, meets_ground, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.tables import Form, prepare_tables, scheduling_speed
@@ -155,7 +156,8 @@ def start_trim(
         InputError: There is no trim.
     """
     if nonlinear:
-        trim = Xv15.load().trim(Condition(airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held and held[0]))
+        aircraft = Xv15.under(AircraftCondition.stored(database.attributes))
+        trim = aircraft.trim(Condition(airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held and held[0]))
         converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
     else:
         point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=held[1] if held else nacelle)
@@ -194,7 +196,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     options = setup.options
     nonlinear = options.plant == "nonlinear"
     beside.start("nonlinear" if nonlinear else "lpv")
-    loaded = load_database(options.database or None)
+    loaded = database_of(options.aircraft)
     database = flown_database(loaded, options.database or None)
     profile = database.profile
     if nonlinear and not profile.is_xv15:
@@ -202,13 +204,13 @@ def build_parts(setup: FlightSetup) -> Parts:
             f"there is no nonlinear model of the {profile.name}", key="plant", value=options.plant,
             allowed="lpv, lpv-plain", mend="fly the LPV aircraft",
         )  # fmt: skip
-    own = Xv15.load().tables
+    own = Xv15.under(AircraftCondition.stored(loaded.attributes)).tables
     airspeed, nacelle, altitude = _start(setup)
     drive = load_drive_tables(profile, rotor_speed=database.rotor_speed, nacelle=database.nacelle, nonlinear=nonlinear)
     offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
     x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle, held))
-    ground = load_ground_tables(profile, mass=own.configuration.mass) if options.ground else no_ground()
+    ground = load_ground_tables(profile, own) if options.ground else no_ground()
     if options.ground:
         if not nonlinear and not meets_ground(loaded):
             raise needed_inputs_error("ground", "on", "false", GROUND_INPUTS)

@@ -81,7 +81,7 @@ class Simulation:
         self._observed = True
         if laws is None:
             options = setup.options
-            chain = load_laws(options.protection, boundary=options.corridor_name, database=options.database)
+            chain = load_laws(options.protection, boundary=options.corridor_name, aircraft=options.aircraft)
             if compiled_law(chain) is None:
                 laws = LawChain(chain, dt=self.tables.dt, profile=self.database.profile)
         self.laws = laws

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.points import TrimPoint
 from rtsim.aircraft.variables import position, required_position
 from rtsim.arguments import number, vector
@@ -289,11 +290,11 @@ class LpvAircraft:
                 )
 
 
-def load_aircraft(path: str | Path | None = None, **options: Any) -> LpvAircraft:
+def load_aircraft(path: str | Path | AircraftCondition | None = None, **options: Any) -> LpvAircraft:
     """Load the LPV aircraft; without a path, the shipped XV-15.
 
     Args:
-        path: A database file (``.nc`` or ``.mat``).
+        path: A database file (``.nc`` or ``.mat``), or a condition whose database is kept.
         **options: ``form`` and ``refresh`` of ``LpvAircraft``.
 
     Returns:

@@ -6,6 +6,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftName
 from rtsim.arrays import FloatArray
 from rtsim.cluster.identity import found_or_told
 from rtsim.cluster.work import Cluster
@@ -21,13 +22,13 @@ def _problem(spec_json: str, aircraft_hash: str) -> ConversionProblem:
     return ConversionProblem(SearchSpec.model_validate_json(spec_json), workers=1)
 
 
-def search_identity(database: str) -> dict[str, str]:
+def search_identity(aircraft: AircraftName) -> dict[str, str]:
     """What a search needs to be the same wherever it is flown, besides rtsim: its aircraft.
 
     Args:
-        database: File of the LPV database; empty: the shipped one.
+        aircraft: File of its database, empty for the shipped one, or a condition, whose database must be kept.
     """
-    return {"database": found_or_told(lambda: load_database(database or None).aircraft_hash)}
+    return {"database": found_or_told(lambda: load_database(aircraft or None).aircraft_hash)}
 
 
 def evaluate_here(spec_json: str, aircraft_hash: str, variables: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -61,7 +62,7 @@ class ClusterEvaluator:
         """
         self._cluster = cluster
         self._spec_json, self._hash = problem.spec.model_dump_json(), problem.database_hash
-        self._own = partial(search_identity, problem.spec.flight.database)
+        self._own = partial(search_identity, problem.setup.options.aircraft)
         cluster.threads(self._own)
 
     def evaluate(self, variables: FloatArray) -> Evaluation:

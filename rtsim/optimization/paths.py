@@ -21,7 +21,6 @@ import numpy as np
 from rtsim.aircraft.profile import xv15_profile
 from rtsim.aircraft.variables import required_position
 from rtsim.arrays import FloatArray
-from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
 from rtsim.optimization.path import (
@@ -31,6 +30,7 @@ from rtsim.optimization.path import (
     PathPoint,
     path_through,
 )
+from rtsim.protection.boundary import load_boundary
 from rtsim.units import deg, kt, to_kt
 
 TABLE_1: tuple[tuple[float, float], ...] = (
@@ -99,7 +99,7 @@ def near_stall(
 
     It follows the power-on stall line of TM 81244 (the corridor ``flight``), which is also where the model stalls.
     """
-    low = load_corridor("flight", None if aircraft is None else aircraft.profile).low
+    low = load_boundary("flight", aircraft).low
     corners = [(0.0, 90.0), (_in_proportion(12.0, aircraft), 80.0)]
     for nacelle in (75.0, 70.5, 65.0, 60.0, 55.0, 50.0, 45.0, 40.0, 35.0, 30.0, 25.0, 20.0, 15.0, 10.0, 5.0, 0.0):
         airspeed = to_kt(float(low.at(deg(nacelle)))) + NEAR_STALL_MARGIN_KT
@@ -121,7 +121,7 @@ def near_stall(
 
 def centre_line_corners(aircraft: Database | None = None) -> list[tuple[float, float]]:
     """The centre line of the design corridor from hover to airplane mode: (airspeed [kn], nacelle angle [deg])."""
-    corridor = load_corridor("design", None if aircraft is None else aircraft.profile)
+    corridor = load_boundary("design", aircraft)
     corners = [(0.0, 90.0)]
     for nacelle in np.arange(90.0, -_STEP_DEG / 2.0, -_STEP_DEG):
         airspeed = to_kt(float(corridor.centre_speed(deg(float(nacelle)))))
@@ -202,7 +202,7 @@ def trim_flapping_map(aircraft: Database | None = None) -> tuple[FloatArray, Flo
 def _fast_side_corners(aircraft: Database | None) -> list[tuple[float, float]]:
     """For each nacelle angle the airspeed of least trim flapping, never falling as the nacelles tilt."""
     airspeeds, nacelles, flapping = trim_flapping_map(aircraft)
-    corridor = load_corridor("design", None if aircraft is None else aircraft.profile)
+    corridor = load_boundary("design", aircraft)
     corners = [(0.0, 90.0)]
     for nacelle in np.arange(90.0, -_STEP_DEG / 2.0, -_STEP_DEG):
         column = flapping[:, int(np.argmin(np.abs(nacelles - nacelle)))]
@@ -289,7 +289,7 @@ def corridor_distance_kt(path: ConversionPath, *, corridor: str = "design", airc
         corridor: Name of the corridor.
     """
     programme = path.programme()
-    boundaries = load_corridor(corridor, None if aircraft is None else aircraft.profile)
+    boundaries = load_boundary(corridor, aircraft)
     time = np.linspace(0.0, programme.duration, 2001)
     airspeed = np.interp(time, programme.time, programme.airspeed)
     nacelle = np.interp(time, programme.time, programme.nacelle_angle)

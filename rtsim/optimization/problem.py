@@ -11,10 +11,10 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.specification import AirSpecification, Turbulence
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.setup import FlightSetup
-from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import ConversionPath, path_through
@@ -77,7 +77,8 @@ class ConversionProblem:
             InputError: The database cannot be used.
         """
         self.spec = spec
-        self.aircraft = load_database(spec.flight.database or None)
+        options = FlightOptions(**given(spec.flight), protection="off")
+        self.aircraft = database_of(options.aircraft)
         self.final_airspeed_kt = conversion_end_kt(self.aircraft)
         self.variables = 2 * spec.points
         air, noise = AirSpecification(), False
@@ -88,7 +89,7 @@ class ConversionProblem:
         start = self.path(np.full(self.variables, 0.5))
         self.setup = FlightSetup(
             programme=start.programme(spec.flight.altitude_m),
-            options=FlightOptions(**given(spec.flight), protection="off", pilot_noise=noise),
+            options=options.changed({"pilot_noise": noise}),
             air=air,
         )
         self._flyer = BatchFlyer(self.setup, workers=workers)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+from rtsim.loop.options import CONDITION, declared
 from rtsim.measures.metrics import OBJECTIVES, FlightFigures, objective_value
 from rtsim.optimization.batch import BatchFlight, BatchFlyer
 from rtsim.optimization.path import ConversionPath
@@ -44,6 +45,7 @@ def scenario_text(problem: ConversionProblem, path: ConversionPath) -> str:
     limits = spec.robust if spec.robust.flights else spec.limits
     flown = problem.setup.options
     said = ("plant", "outer_loop", "rate_hz", *(("database",) if flown.database else ()))
+    said += tuple(declared()[name].key for name in CONDITION if getattr(flown, name) != declared()[name].default)
     flight = {"corridor": flown.corridor_name, **{key: flown.shown()[key] for key in said}}
     expectations = (
         ("keeps its distance to the corridor's boundaries", "corridor.worst_margin_kt", limits.margin_kt, None),

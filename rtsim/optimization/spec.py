@@ -10,7 +10,7 @@ from pydantic import Field, create_model
 
 from rtsim.errors import InputError
 from rtsim.loop.option_tables import table_fields
-from rtsim.loop.options import declared
+from rtsim.loop.options import CONDITION, declared
 from rtsim.optimization.path import AccelerationCaps
 from rtsim.optimization.paths import FAST_SIDE_CAPS, NEAR_STALL_CAPS, PATH_NAMES
 from rtsim.strict import Examined, Strict, checked
@@ -75,7 +75,7 @@ class SearchTable(Strict):
 _OPTIONS: Any = create_model(
     "_OPTIONS",
     __base__=Strict,
-    **table_fields(declared()[name] for name in ("plant", "outer_loop", "corridor", "rate_hz", "database")),
+    **table_fields(declared()[name] for name in ("plant", "outer_loop", "corridor", "rate_hz", "database", *CONDITION)),
 )
 
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.variables import required_position
 from rtsim.arrays import FloatArray
 from rtsim.choices import CORRIDOR_NAMES
@@ -73,7 +74,7 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
         middle = int(np.argmin(torque[good, j]))
         low[j] = _crossing(speeds[middle::-1], spare[middle::-1])
         high[j] = _crossing(speeds[middle:], (bound - torque[good, j])[middle:])
-    published = load_corridor("design", database.profile)
+    published = _chart("design", database)
     downstop = float(high[0])
     off_stop = angles > published.downstop_nacelle + 1e-9
     # On and just off the stop the trims are the same but for the flaps; the step stays at the downstop.
@@ -107,7 +108,10 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
 
     Args:
         name: ``design``, ``flight`` or ``model``.
-        database: The aircraft; None: the shipped XV-15.
+        database: The aircraft, and the air it flies in; None: the shipped XV-15.
+
+    Returns:
+        The boundary in true airspeed.
 
     Raises:
         InputError: There is no such boundary.
@@ -115,12 +119,18 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
     if name not in CORRIDOR_NAMES:
         raise InputError("no such boundary", key="corridor", value=name, allowed=", ".join(CORRIDOR_NAMES))
     if name != "model":
-        return load_corridor(name, None if database is None else database.profile)
+        return load_corridor(name) if database is None else _chart(name, database)
     if database is None:
         from rtsim.lpv.files.storage import load_database
 
         database = load_database()
     return model_corridor(database)
+
+
+def _chart(name: str, database: Database) -> Corridor:
+    """A published corridor, in true airspeed of the air that the aircraft flies in."""
+    condition = AircraftCondition.stored(database.attributes)
+    return load_corridor(name, database.profile).in_true_airspeed(condition.true_over_calibrated)
 
 
 def guarded_corridor(corridor: Corridor, database: Database, guard: float) -> Corridor:

@@ -10,6 +10,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftName
 from rtsim.choices import CorridorName
 from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.lpv.database import Database
@@ -171,8 +172,8 @@ class LawSpec:
     """Built-in name, entry point or ``MODULE:CLASS``."""
     boundary: CorridorName = "flight"
     """Corridor that a built-in law keeps to."""
-    database: str = ""
-    """LPV database of the aircraft that a built-in law knows, a file; empty: the shipped XV-15."""
+    aircraft: AircraftName = ""
+    """The aircraft that a built-in law knows: a database file, empty for the shipped XV-15, or a condition."""
 
     @property
     def built_in(self) -> bool:
@@ -186,19 +187,19 @@ class LawSpec:
             InputError: There is no such law, or its class cannot be made.
         """
         if self.built_in:
-            return BuiltInLaw(self.name, boundary=self.boundary, database=load_database(self.database or None))
+            return BuiltInLaw(self.name, boundary=self.boundary, database=load_database(self.aircraft or None))
         target = find_plugin(self.name, LAW_PLUGIN)
         return cast("ProtectionLaw", make_plugin(target, self.name, LAW_PLUGIN))
 
 
-def load_law(name: str, *, boundary: CorridorName = "flight", database: str = "") -> LawSpec:
+def load_law(name: str, *, boundary: CorridorName = "flight", aircraft: AircraftName = "") -> LawSpec:
     """Find a law by name.
 
     Args:
         name: ``off``, ``monitor``, ``governor``, ``full``, the name of an entry point in the group
             ``rtsim.protection_laws``, or ``MODULE:CLASS``; modules are also looked for in the current directory.
         boundary: Corridor that a built-in law keeps to.
-        database: LPV database of the aircraft that a built-in law knows, a file; empty: the shipped XV-15.
+        aircraft: What a built-in law knows: a database file, empty for the shipped XV-15, or a condition.
 
     Returns:
         The law; ``make()`` gives a fresh one for a flight.
@@ -206,21 +207,21 @@ def load_law(name: str, *, boundary: CorridorName = "flight", database: str = ""
     Raises:
         InputError: There is no such law, or it has no method ``step``.
     """
-    spec = LawSpec(name, boundary, database)
+    spec = LawSpec(name, boundary, aircraft)
     if not spec.built_in:
         find_plugin(name, LAW_PLUGIN)
     return spec
 
 
 def load_laws(
-    names: str | Sequence[str], *, boundary: CorridorName = "flight", database: str = ""
+    names: str | Sequence[str], *, boundary: CorridorName = "flight", aircraft: AircraftName = ""
 ) -> tuple[LawSpec, ...]:
     """Find a chain of laws.
 
     Args:
         names: The laws in the order in which they act, as a sequence or separated by commas.
         boundary: Corridor that built-in laws keep to.
-        database: LPV database of the aircraft that built-in laws know, a file; empty: the shipped XV-15.
+        aircraft: What built-in laws know: a database file, empty for the shipped XV-15, or a condition.
 
     Returns:
         The laws; ``off`` is left out of a chain of several.
@@ -229,7 +230,7 @@ def load_laws(
         InputError: One of them is none.
     """
     listed = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
-    laws = tuple(load_law(name, boundary=boundary, database=database) for name in listed)
+    laws = tuple(load_law(name, boundary=boundary, aircraft=aircraft) for name in listed)
     if len(laws) == 1:
         return laws
     return tuple(law for law in laws if law.name != "off")

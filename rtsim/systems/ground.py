@@ -8,7 +8,7 @@ import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile
 from rtsim.aircraft.xv15.dynamics_kernels import gravity_centre
-from rtsim.aircraft.xv15.model import Xv15
+from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.systems.ground_kernels import DOWN, FORWARD, GroundTables
@@ -22,12 +22,12 @@ def no_ground() -> GroundTables:
     return GroundTables(0.0, 0.0, _NONE, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0)
 
 
-def load_ground_tables(profile: AircraftProfile, *, mass: float) -> GroundTables:
+def load_ground_tables(profile: AircraftProfile, tables: AircraftTables) -> GroundTables:
     """Ground and gear of an aircraft; geometry and inertia are those of the nonlinear XV-15.
 
     Args:
         profile: The aircraft.
-        mass: Its mass [kg].
+        tables: The nonlinear XV-15, with the mass and centre of gravity that stand on the wheels.
 
     Raises:
         InputError: It has no gear, or a value is missing or out of range.
@@ -37,7 +37,7 @@ def load_ground_tables(profile: AircraftProfile, *, mass: float) -> GroundTables
             f"the {profile.name} has no landing gear", key="ground", value=True, allowed="false",
             mend="add the table [systems.gear] to its profile (docs/ground.md)",
         )  # fmt: skip
-    part, tables = profile.systems.table("gear"), Xv15.load().tables
+    part, mass = profile.systems.table("gear"), tables.configuration.mass
     centre = np.array(gravity_centre(tables.mass, deg(90.0)))
     forward, down, share, stroke = [], [], [], []
     for place in ("nose", "main"):

@@ -15,6 +15,7 @@ from types import ModuleType
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftName
 from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
 from rtsim.cluster.identity import found_or_told
@@ -161,21 +162,23 @@ def fly_law(
         return bench.fly(plan, law.name, buffer=kt(law.buffer_kt), keep=keep)
     try:
         options = plan.setup.options
-        laws = _python_laws(law.name, folder, options.corridor or TRIAL_CORRIDOR, options.database)
+        laws = _python_laws(law.name, folder, options.corridor or TRIAL_CORRIDOR, options.aircraft)
         return bench.fly(plan, laws, repeat=repeat, keep=keep)
     except InputError as error:
         flight = bench.fly(plan, "off", keep=keep)
         return TrialFlight(flight.metrics, flight.end_reason, flight.rows, (str(error).rstrip("."),))
 
 
-def law_chain(name: str, folder: str, boundary: CorridorName = "flight", database: str = "") -> Sequence[LawSpec]:
+def law_chain(
+    name: str, folder: str, boundary: CorridorName = "flight", aircraft: AircraftName = ""
+) -> Sequence[LawSpec]:
     """Find a law, or several separated by commas.
 
     Args:
         name: What the user wrote.
         folder: Where modules are looked for besides the installed ones.
         boundary: Corridor that built-in laws of a chain keep to.
-        database: LPV database of the aircraft that they know, a file; empty: the shipped XV-15.
+        aircraft: What they know: a database file, empty for the shipped XV-15, or a condition.
 
     Raises:
         InputError: There is no such law.
@@ -184,12 +187,12 @@ def law_chain(name: str, folder: str, boundary: CorridorName = "flight", databas
 
     if folder and folder not in sys.path:
         sys.path.append(folder)
-    return load_laws(name, boundary=boundary, database=database)
+    return load_laws(name, boundary=boundary, aircraft=aircraft)
 
 
 @functools.lru_cache(maxsize=8)
-def _python_laws(name: str, folder: str, boundary: CorridorName, database: str) -> Sequence[LawSpec]:
-    return law_chain(name, folder, boundary, database)
+def _python_laws(name: str, folder: str, boundary: CorridorName, aircraft: AircraftName) -> Sequence[LawSpec]:
+    return law_chain(name, folder, boundary, aircraft)
 
 
 def law_code(task: Task) -> dict[str, str]:
@@ -224,8 +227,8 @@ def task_identity(task: Task) -> dict[str, str]:
     Args:
         task: The campaign.
     """
-    database = task.options.database or None
-    found = {"database": found_or_told(lambda: load_database(database).aircraft_hash)}
+    # Looked up, never built: a cluster's worker that builds for minutes would be given up meanwhile.
+    found = {"database": found_or_told(lambda: load_database(task.options.aircraft or None).aircraft_hash)}
     try:
         return found | {f"law {name}": code for name, code in law_code(task).items()}
     except InputError as error:
@@ -243,16 +246,16 @@ def _spec(text: str, file: str) -> CampaignFile:
 def _refuse_another(task: Task) -> None:
     """Refuse to fly where the aircraft is another than the campaign's."""
     log = logging.getLogger("rtsim.lpv.files.storage")
-    level, database = log.level, task.options.database
+    level = log.level
     log.setLevel(logging.ERROR)  # what the aircraft borrows was said where the campaign was started
     try:
-        present = load_database(database or None).aircraft_hash
+        present = load_database(task.options.aircraft or None).aircraft_hash
     finally:
         log.setLevel(level)
     if task.aircraft_hash != present:
         raise InputError(
             "a worker has another aircraft than the campaign",
-            file=database or None,
+            file=task.options.database or None,
             key="database",
             value=present[:12],
             allowed=task.aircraft_hash[:12],

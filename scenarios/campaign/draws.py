@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftName
 from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
 from rtsim.corridor.boundaries import Corridor
 from rtsim.errors import InputError
 from rtsim.faults.fault import Fault
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.loop.setup import FlightSetup
-from rtsim.lpv.files.storage import load_database
 from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
@@ -52,8 +53,8 @@ def draw_plan(
         programme, start = scenario.programme, scenario.start
         duration = scenario.duration if item.duration_s is None else item.duration_s
     else:
-        corridor = load_boundary(spec.corridor, load_database(common.database or None))
-        start = _start(item, corridor, common.database, generator)
+        corridor = load_boundary(spec.corridor, database_of(common.aircraft))
+        start = _start(item, corridor, common.aircraft, generator)
         programme = _programme(item, start, corridor, generator)
         duration = spec.duration_s if item.duration_s is None else item.duration_s
     pulses = tuple(pulse for table in item.pulses for pulse in _pulses(table, generator))
@@ -87,7 +88,7 @@ def _options(item: ClassTable, generator: Generator) -> dict[str, Any]:
     }
 
 
-def _start(item: ClassTable, corridor: Corridor, database: str, generator: Generator) -> ProgrammePoint:
+def _start(item: ClassTable, corridor: Corridor, aircraft: AircraftName, generator: Generator) -> ProgrammePoint:
     table = item.start
     assert table is not None  # the file was checked
     for _ in range(ATTEMPTS):
@@ -102,7 +103,7 @@ def _start(item: ClassTable, corridor: Corridor, database: str, generator: Gener
             airspeed = low + kt(draw(table.above_low_kt, generator))
         altitude = draw(table.altitude_m, generator)
         margin = min(airspeed - low, high - airspeed)
-        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle, database):
+        if margin >= kt(table.margin_kt) and _has_trim(airspeed, angle, aircraft):
             return ProgrammePoint(airspeed, angle, altitude)
     raise InputError(
         f"no start of the class {item.name} lies inside the corridor and has a trim",
@@ -113,8 +114,8 @@ def _start(item: ClassTable, corridor: Corridor, database: str, generator: Gener
 
 
 @functools.lru_cache(maxsize=64)
-def _has_trim(airspeed: float, angle: float, database: str) -> bool:
-    return has_trim("lpv", airspeed, angle, database=database)
+def _has_trim(airspeed: float, angle: float, aircraft: AircraftName) -> bool:
+    return has_trim("lpv", airspeed, angle, aircraft=aircraft)
 
 
 def _programme(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> Programme:

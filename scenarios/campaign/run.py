@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from rtsim.errors import InputError
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
-from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metric_kernels import VALUE
 from rtsim.versions import versions
 from scenarios.campaign.chunks import (
@@ -98,6 +98,7 @@ class CampaignResult:
             "seed": self.task.seed,
             "plant": self.task.options.plant,
             "database": self.task.options.database,
+            **self.task.options.condition_shown,
             "database_hash": self.task.aircraft_hash,
             "corridor_name": self.task.options.corridor_name,
             "rate_hz": self.task.options.rate_hz,
@@ -256,7 +257,7 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
         seed=options.seed,
         options=flown,
         folder=folder,
-        aircraft_hash=load_database(flown.database or None).aircraft_hash,
+        aircraft_hash=database_of(flown.aircraft).aircraft_hash,
     )
 
 

@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftName
 from rtsim.arrays import FloatArray
 from rtsim.choices import BUILT_IN_PILOT, CorridorName, PlantName
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_COUNT, history_sha256
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.data import SimulationTables
 from rtsim.loop.script_kernels import S_YIELDED
 from rtsim.loop.setup import FlightSetup, build_parts, start_trim
 from rtsim.loop.simulation import Simulation
-from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.flown import flown_database
 from rtsim.measures.metrics import TrialMetrics, measured
 from rtsim.protection.chain import LawChain, compiled_law
@@ -167,16 +168,16 @@ def _fly_by_hand(simulation: Simulation, pilot: Pilot, rows: FloatArray) -> Floa
     return rows[:flown]
 
 
-def has_trim(plant: PlantName, airspeed: float, nacelle: float, *, database: str = "") -> bool:
+def has_trim(plant: PlantName, airspeed: float, nacelle: float, *, aircraft: AircraftName = "") -> bool:
     """Whether a flight can start somewhere.
 
     Args:
         plant: Aircraft model.
-        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
+        aircraft: A database file, empty for the shipped XV-15, or a condition.
     """
-    aircraft = flown_database(load_database(database or None), database or None)
+    database = flown_database(database_of(aircraft), aircraft if isinstance(aircraft, str) else None)
     try:
-        start_trim(plant == "nonlinear", aircraft, airspeed, nacelle)
+        start_trim(plant == "nonlinear", database, airspeed, nacelle)
     except InputError:
         return False
     return True

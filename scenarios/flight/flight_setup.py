@@ -8,8 +8,9 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter
 
+from rtsim.aircraft.condition import AircraftName
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.simulation import FlightSetup
-from rtsim.lpv.files.storage import load_database
 from rtsim.programme import Programme
 from rtsim.protection.boundary import load_boundary
 from rtsim.units import to_deg, to_kt
@@ -36,14 +37,14 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
     )
 
 
-def corridor_outline(name: str, database: str = "") -> CorridorOutline:
+def corridor_outline(name: str, aircraft: AircraftName = "") -> CorridorOutline:
     """The boundaries of a corridor as plain arrays, for views and logs.
 
     Args:
         name: ``design``, ``flight`` or ``model``.
-        database: LPV database of the aircraft, a file; empty: the shipped XV-15.
+        aircraft: A database file, empty for the shipped XV-15, or a condition.
     """
-    corridor = load_boundary(name, load_database(database) if database else None)
+    corridor = load_boundary(name, database_of(aircraft) if aircraft else None)
     high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
     high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
     high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]

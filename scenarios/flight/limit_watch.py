@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.aircraft.condition import AircraftName
 from rtsim.arrays import FloatArray
 from rtsim.corridor.boundaries import LEVEL_NAMES
 from rtsim.frame import COLUMN, SIGNAL_COUNT
+from rtsim.loop.aircraft import database_of
 from rtsim.lpv.database import Database
-from rtsim.lpv.files.storage import load_database
 from rtsim.protection.limits import LIMIT_KINDS, WATCHED, load_levels
 from rtsim.protection.monitor import MarginWatch, driven_of_rows, monitor_tables, sensors_of_rows
 from rtsim.protection.monitor_kernels import KIND, LIMIT_WORDS, MonitorTables
@@ -37,16 +38,18 @@ _CHANNELS = (
 class LimitWatch:
     """One flight's limits and interventions."""
 
-    def __init__(self, corridor_name: str, tell: Callable[[LogEvent], None], *, dt: float, database: str = "") -> None:
+    def __init__(
+        self, corridor_name: str, tell: Callable[[LogEvent], None], *, dt: float, aircraft: AircraftName = ""
+    ) -> None:
         """Load the limits.
 
         Args:
             corridor_name: Corridor that is watched.
             tell: Told every event.
-            database: LPV database of the aircraft, a file; empty: the shipped XV-15.
+            aircraft: A database file, empty for the shipped XV-15, or a condition.
         """
-        aircraft = load_database(database or None)
-        self._levels = MarginWatch(_tables(corridor_name, aircraft), load_levels(aircraft.profile), dt)
+        database = database_of(aircraft)
+        self._levels = MarginWatch(_tables(corridor_name, database), load_levels(database.profile), dt)
         self._dt, self._tell = dt, tell
         self._noted: list[LogEvent] = []
         self._waiting = np.empty((BATCH_ROWS, SIGNAL_COUNT))

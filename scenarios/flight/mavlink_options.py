@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Literal
 
 import rtsim
 from rtsim.aids.design import SWITCHES
+from rtsim.aircraft.condition import AircraftName
 from rtsim.choices import HAND_PILOT
 from rtsim.errors import InputError
-from rtsim.lpv.files.storage import load_database
+from rtsim.loop.aircraft import database_of
 from rtsim.protection.limits import load_limits
 from rtsim.sticks.settings import StickSettings
 from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
@@ -82,7 +83,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         bind_port=port,
         autopilot=options.autopilot,
         rate_hz=float(scenario.options.rate_hz),
-        ratings=_ratings(scenario.options.database),
+        ratings=_ratings(scenario.options.aircraft),
         home=options.home,
         aids={name: name in aids_on for name in SWITCHES},
         parameters=stick_settings(stick_map).parameters(),
@@ -99,18 +100,18 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
     return config, warning
 
 
-def _ratings(database: str) -> Ratings:
+def _ratings(aircraft: AircraftName) -> Ratings:
     """Full torque and rotor speed of an aircraft; the shipped one's need not wait for its database."""
-    if not database:
+    if not aircraft:
         return Ratings()
-    aircraft = load_database(database)
-    torque = load_limits(aircraft.profile).torque
+    database = database_of(aircraft)
+    torque = load_limits(database.profile).torque
     return Ratings(
         torque_inlb=torque.cruise / INCH_POUND,
         hover_torque_inlb=torque.takeoff / INCH_POUND,
         hover_nacelle_deg=to_deg(torque.takeoff_nacelle),
         hover_airspeed_kt=to_kt(torque.takeoff_airspeed),
-        rotor_speed_rpm=to_rpm(aircraft.governed_speed) if aircraft.governed_speed > 0.0 else Ratings().rotor_speed_rpm,
+        rotor_speed_rpm=to_rpm(database.governed_speed) if database.governed_speed > 0.0 else Ratings().rotor_speed_rpm,
     )
 
 

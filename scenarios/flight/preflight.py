@@ -36,6 +36,10 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
     }  # fmt: skip
     if scenario.options.database:  # the shipped one is there, and a flight need not wait for it here
         named["database"] = load_database
+    try:
+        scenario.options.aircraft  # noqa: B018 - it may be refused
+    except InputError as error:
+        return [_placed(error, scenario, "database")]
     for key, look_up in named.items():
         try:
             look_up(getattr(scenario.options, key))
@@ -60,7 +64,10 @@ def preflight_problems(scenario: Scenario) -> list[InputError]:
 
 def start_problems(scenario: Scenario) -> list[InputError]:
     """Whether there is an aircraft, and whether it can be trimmed where a scenario starts; empty where it can."""
-    start, own = scenario.start, scenario.options.database
+    try:
+        start, own = scenario.start, scenario.options.aircraft
+    except InputError:
+        return []  # which preflight_problems tells
     if not own and (start.airspeed, start.nacelle_angle) in START_CONDITIONS.values():
         return []
     from rtsim.lpv.aircraft import load_aircraft
@@ -68,7 +75,7 @@ def start_problems(scenario: Scenario) -> list[InputError]:
     try:
         aircraft = load_aircraft(own or None)
     except InputError:
-        return []  # which preflight_problems tells
+        return []  # which preflight_problems tells, or it is yet to be built
     try:
         if aircraft.trim(airspeed=start.airspeed, nacelle=start.nacelle_angle).converged:
             return []

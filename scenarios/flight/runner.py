@@ -206,7 +206,7 @@ def _start_view(scenario: Scenario, outputs: FlightOutputs) -> RerunView | None:
         options = dataclasses.replace(options, record=Path(os.path.realpath(options.record)))
     return RerunView(
         options,
-        corridor=corridor_outline(scenario.options.corridor_name, scenario.options.database),
+        corridor=corridor_outline(scenario.options.corridor_name, scenario.options.aircraft),
         title=scenario.name,
         rate_hz=scenario.options.rate_hz,
         on_message=outputs.on_message,
@@ -267,7 +267,7 @@ def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutput
         rate_hz=float(scenario.options.rate_hz),
         versions=versions(),
         setup=replay_setup(scenario),
-        corridor=corridor_outline(scenario.options.corridor_name, scenario.options.database),
+        corridor=corridor_outline(scenario.options.corridor_name, scenario.options.aircraft),
     )
     return Recorder(outputs.log, metadata, live=live, overwrite=outputs.overwrite)
 
@@ -303,7 +303,7 @@ def _limit_watch(scenario: Scenario, dt: float) -> Callable[[Callable[[LogEvent]
     """What watches the flight's limits; nothing with the protection off."""
     if scenario.options.protection == "off":
         return None
-    return functools.partial(LimitWatch, scenario.options.corridor_name, dt=dt, database=scenario.options.database)
+    return functools.partial(LimitWatch, scenario.options.corridor_name, dt=dt, aircraft=scenario.options.aircraft)
 
 
 def _close(

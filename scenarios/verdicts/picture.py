@@ -12,7 +12,7 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.drawing import drawing
 from rtsim.frame import COLUMN
-from rtsim.lpv.files.storage import load_database
+from rtsim.loop.aircraft import database_of
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import LIMIT_KINDS, load_limits
@@ -115,7 +115,7 @@ def _flights(case: Case) -> list[tuple[str, FloatArray, str]]:
 
 def _draw_path(axes: Any, case: Case, flights: Sequence[tuple[str, FloatArray, str]]) -> None:
     name = case.scenario.options.corridor_name
-    corridor = load_boundary(name, load_database(case.scenario.options.database or None))
+    corridor = load_boundary(name, database_of(case.scenario.options.aircraft))
     stop = float(to_deg(corridor.downstop_nacelle))
     angles = np.linspace(corridor.downstop_nacelle, np.pi / 2.0, 181)
     low = np.concatenate([[float(corridor.low.at(0.0))], np.asarray(corridor.low.at(angles))])
@@ -163,7 +163,7 @@ def _draw_margin(axes: Any, flights: Sequence[tuple[str, FloatArray, str]]) -> N
 
 def _draw_shares(axes: Any, case: Case, flights: Sequence[tuple[str, FloatArray, str]]) -> None:
     """Torque, flapping and pitch as shares of their limits."""
-    limits = load_limits(load_database(case.scenario.options.database or None).profile)
+    limits = load_limits(database_of(case.scenario.options.aircraft).profile)
     for label, rows, _ in flights:
         allowed = [
             torque_limit(limits.torque, kt(row[COLUMN.airspeed_kt]), row[COLUMN.nacelle_deg] * DEGREE) / INCH_POUND

@@ -11,9 +11,10 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.choices import HAND_PILOT
+from rtsim.errors import RtsimError
 from rtsim.frame import SIGNAL_COUNT, history_sha256
+from rtsim.loop.aircraft import database_of
 from rtsim.loop.options import FlightOptions
-from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metrics import FlightMetrics, TrialMetrics
 from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
 from scenarios.campaign.events import new_violations
@@ -124,6 +125,8 @@ class Case:
             "seed": self.scenario.options.seed,
             "plant": self.scenario.options.plant,
             "database": self.scenario.options.database,
+            "database_hash": _aircraft_hash(self.scenario.options),
+            **self.scenario.options.condition_shown,
             "corridor_name": self.scenario.options.corridor_name,
             "failures": [finding.sentence for finding in self.failures],
             "expectations": [
@@ -145,6 +148,14 @@ class Case:
         }
 
 
+def _aircraft_hash(options: FlightOptions) -> str:
+    """Hash of the aircraft; empty where there is none, which is the case's error."""
+    try:
+        return database_of(options.aircraft).aircraft_hash
+    except RtsimError:
+        return ""
+
+
 class Tester:
     """Flies cases; keeps what is costly to load."""
 
@@ -158,7 +169,7 @@ class Tester:
         Raises:
             InputError: There is no such law, an option is out of range, or the database cannot be used.
         """
-        load_database(FlightOptions().changed(options).database or None)
+        database_of(FlightOptions().changed(options).aircraft)
         self._law, self._options = law, options
         self._folder = present_folder()
         self._bench = Bench()

@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 
 from rtsim.cli.main import build_app
 from rtsim.errors import InputError
-from rtsim.loop.options import FlightOptions, Option, declared
+from rtsim.loop import option_tables
+from rtsim.loop.options import CONDITION, FlightOptions, Option, declared
 from rtsim.loop.setup import FlightSetup
 from rtsim.lpv.files.netcdf import SHIPPED
 from rtsim.programme import Programme
@@ -173,13 +174,20 @@ def test_the_command_line_offers_every_option_with_help_and_default() -> None:
 
 
 def test_a_campaign_draws_and_sets_options() -> None:
-    given_once = {item.key: OTHER[item.key] for item in FILE_OPTIONS}
+    conditions = [item for item in FILE_OPTIONS if item.name in CONDITION]  # which a database of one's own excludes
+    spec, problems = parse_campaign(
+        CAMPAIGN.format(file=toml({item.key: OTHER[item.key] for item in conditions}), classes=""), file="mine.toml"
+    )
+    assert spec is not None, problems
+    assert option_tables.given(spec) == {item.name: item.inside(OTHER[item.key]) for item in conditions}
+    file_options = [item for item in FILE_OPTIONS if item not in conditions]
+    given_once = {item.key: OTHER[item.key] for item in file_options}
     in_class = {item.key: OTHER[item.key] for item in CLASS_OPTIONS}
     text = CAMPAIGN.format(file=toml(given_once), classes=toml(in_class))
     spec, problems = parse_campaign(text, file="/tmp/mine.toml")
     assert spec is not None, problems
     options = draw_plan(spec, seed=0, class_number=0, run=0).setup.options
-    for item in (*FILE_OPTIONS, *CLASS_OPTIONS):
+    for item in (*file_options, *CLASS_OPTIONS):
         assert getattr(options, item.name) == item.inside(OTHER[item.key]), item.key
     numbers = [item for item in CLASS_OPTIONS if item.is_number]
     assert numbers

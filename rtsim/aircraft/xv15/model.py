@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rtsim.aircraft.atmosphere import standard_atmosphere
+from rtsim.aircraft.condition import SHIPPED, AircraftCondition
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
 from rtsim.aircraft.variables import OUTPUTS, STATES
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
@@ -18,7 +19,7 @@ from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import packed
-from rtsim.units import rpm
+from rtsim.units import INCH, rpm
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +47,24 @@ class Xv15:
 
         return Xv15(packed(load_tables(changes)))
 
+    @staticmethod
+    def under(condition: AircraftCondition) -> Xv15:
+        """The aircraft at another weight, in other air, with its centre of gravity elsewhere.
+
+        The pylons' share in the weight, and with it the travel of the centre of gravity with the nacelles, follows the
+        weight as the source says; its height and the moments of inertia stay.
+
+        Args:
+            condition: Weight, air and centre of gravity.
+        """
+        return Xv15.load() if condition == SHIPPED else Xv15(_conditioned_tables(condition))
+
     def at(self, condition: Condition) -> Xv15:
         """The same aircraft with the condition's mass, air, rotor speed and flap."""
-        density, sound_speed = standard_atmosphere(condition.pressure_altitude)
         base = self.tables.configuration
+        density, sound_speed = base.density, base.sound_speed
+        if condition.pressure_altitude is not None:
+            density, sound_speed = standard_atmosphere(condition.pressure_altitude)
         configuration = base._replace(
             mass=base.mass if condition.mass is None else condition.mass,
             density=density,
@@ -62,9 +77,7 @@ class Xv15:
     @property
     def airplane_rotor_speed(self) -> float:
         """Rotor speed of airplane mode [rad/s]."""
-        from rtsim.aircraft.xv15.data_reader import read_data
-
-        return float(rpm(read_data()[0]["rotor"]["rpm_airplane"]))
+        return _airplane_rotor_speed()
 
     def derivative(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
         """State derivative.
@@ -115,6 +128,28 @@ class Xv15:
 def _cached_tables() -> AircraftTables:
     data = sorted((Path(__file__).parent / "data").glob("*.toml"))
     return packed(kept("xv15", b"".join(path.read_bytes() for path in data), _plain_tables))
+
+
+@cache
+def _airplane_rotor_speed() -> float:
+    """Read once: a database asks for it at every trim."""
+    from rtsim.aircraft.xv15.data_reader import read_data
+
+    return float(rpm(read_data()[0]["rotor"]["rpm_airplane"]))
+
+
+@lru_cache(maxsize=8)
+def _conditioned_tables(condition: AircraftCondition) -> AircraftTables:
+    from rtsim.aircraft.xv15.data_reader import read_data
+
+    centre, share = read_data()[0]["cg"], SHIPPED.mass / condition.mass
+    changes: dict[str, Any] = {"cg.heli_SL_in": centre["heli_SL_in"] - condition.cg_forward / INCH}
+    changes |= {f"cg.{key}": centre[key] * share for key in ("shift_X_ft", "shift_Z_ft")}
+    tables = Xv15.load(changes).tables
+    density, sound_speed = standard_atmosphere(condition.density_altitude)
+    mass = tables.configuration.mass if condition.mass == SHIPPED.mass else condition.mass  # 13000.02 lb in the data
+    configuration = tables.configuration._replace(mass=mass, density=density, sound_speed=sound_speed)
+    return tables._replace(configuration=configuration)
 
 
 def _plain_tables() -> AircraftTables:

@@ -211,31 +211,39 @@ def _level_row(aircraft: GridAircraft, grid: Grid, number: int, before: Row) -> 
     row: Row = [None] * grid.airspeed.size
     if wanted.size == 0:
         return row
-    first_row = not any(before)
-    seed = _seed(aircraft, grid, number, [int(v) for v in wanted if first_row or before[v] is not None])
+    candidates = [int(v) for v in wanted if before[v] is not None]
+    if candidates:
+        seed = _seed(grid, number, candidates)
+    else:
+        seed, row[seed] = _beginning(aircraft, grid, number, [int(v) for v in wanted])
     for direction in (1, -1):
         v = seed if direction == 1 else seed - 1
         while wanted[0] <= v <= wanted[-1]:
             neighbours = [p for p in (row[v - direction] if v != seed else None, before[v]) if p is not None]
             guesses = [*_secant(grid, row, v, direction), *((p.x, p.u) for p in neighbours)]
-            if first_row and v == seed:
-                row[v] = _attempt(aircraft, grid, (v, nacelle, 0.0), [None], [])
-                if row[v] is None:
-                    raise TrimError(
-                        "the continuation found no trim to start from",
-                        key="airspeed, nacelle",
-                        value=(float(grid.airspeed[v]), nacelle),
-                        mend="check the aircraft data",
-                    )
-            elif neighbours:
+            if neighbours:
                 row[v] = _attempt(aircraft, grid, (v, nacelle, 0.0), guesses, neighbours)
             v += direction
     return row
 
 
-def _seed(aircraft: GridAircraft, grid: Grid, number: int, candidates: Sequence[int]) -> int:
+def _beginning(aircraft: GridAircraft, grid: Grid, number: int, wanted: Sequence[int]) -> tuple[int, GridPoint]:
+    """Where the continuation begins: as near as there is a trim to where a row is started from."""
+    nacelle, best = float(grid.nacelle[number]), _seed(grid, number, wanted)
+    for v in sorted(wanted, key=lambda v: abs(grid.airspeed[v] - grid.airspeed[best])):
+        point = _attempt(aircraft, grid, (v, nacelle, 0.0), [None], [])
+        if point is not None:
+            return v, point
+    raise TrimError(
+        "the continuation found no trim to start from",
+        key="airspeed, nacelle",
+        value=(float(grid.airspeed[best]), nacelle),
+        mend="check the aircraft data; it may be too heavy for this air",
+    )
+
+
+def _seed(grid: Grid, number: int, candidates: Sequence[int]) -> int:
     """Airspeed to start a row from: hover on the helicopter side, else the middle of what the row before has."""
-    del aircraft
     if grid.nacelle[number] >= HELICOPTER_SIDE - 1e-9:
         return int(min(candidates, key=lambda v: abs(grid.airspeed[v])))
     return int(candidates[len(candidates) // 2])

@@ -14,6 +14,7 @@ import numpy as np
 
 import rtsim
 import rtsim.aircraft.xv15
+from rtsim.aircraft.condition import SHIPPED, AircraftCondition
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
 from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES, Variable
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
@@ -52,6 +53,17 @@ class Xv15Grid:
 
     aircraft: Xv15 = field(default_factory=Xv15.load)
     """The nonlinear model."""
+    condition: AircraftCondition = SHIPPED
+    """Its weight, air and centre of gravity."""
+
+    @staticmethod
+    def under(condition: AircraftCondition) -> Xv15Grid:
+        """The XV-15 at a condition.
+
+        Args:
+            condition: Weight, air and centre of gravity.
+        """
+        return Xv15Grid(Xv15.under(condition), condition)
 
     @property
     def states(self) -> Sequence[Variable]:
@@ -82,6 +94,7 @@ class Xv15Grid:
             "title": "Bell XV-15, symmetric plane: trim map and linear models over the conversion corridor",
             "mass_kg": float(configuration.mass),
             "air_density_kg_m3": float(configuration.density),
+            **self.condition.attributes,
             "source_sha256": source_sha256(),
             "rtsim_version": rtsim.__version__,
             "numpy_version": np.__version__,
@@ -199,7 +212,7 @@ def still_trims(database: Database) -> bool:
     Returns:
         Whether state derivatives and outputs at sampled trims are what the database says.
     """
-    aircraft = Xv15.load()
+    aircraft = Xv15.under(AircraftCondition.stored(database.attributes))
     if (database.states, database.inputs, database.outputs) != (STATES, INPUTS, OUTPUTS):
         return False
     for cell in map(tuple, np.argwhere(database.valid)[::SAMPLE]):

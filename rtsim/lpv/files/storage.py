@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import functools
 import logging
+import threading
 from dataclasses import replace
 from pathlib import Path
 
+from rtsim.aircraft.condition import SHIPPED as SHIPPED_CONDITION
+from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.profile import (
     OWN_SUFFIX,
     PARTS,
@@ -16,21 +19,27 @@ from rtsim.aircraft.profile import (
     read_profile,
     xv15_profile,
 )
+from rtsim.errors import InputError
 from rtsim.kernels.kept import kept
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.assemble import LARGEST_FILE
+from rtsim.lpv.files.kept_databases import kept_file
 from rtsim.lpv.files.mat import read_mat, write_mat
 from rtsim.lpv.files.netcdf import SHIPPED, read_database, write_database
 from rtsim.outside import regular_file, status_of
 
+_LIBRARY = threading.Lock()
+"""HDF5 bears one thread at a time."""
 
-def load_database(path: str | Path | None = None) -> Database:
+
+def load_database(path: str | Path | AircraftCondition | None = None) -> Database:
     """Read a database; without a path, the shipped one.
 
     Args:
         path: A NetCDF or MATLAB file (``.mat``) as written by ``save_database``; the layout is in docs/lpv.md. Its
             aircraft profile stands beside it (``NAME.profile.toml``) or in it; one that has none flies with the XV-15's
-            parts, which is said once.
+            parts, which is said once. Or a condition of the XV-15: what was built for it earlier and is kept
+            (``rtsim.loop.aircraft.database_of`` builds it).
 
     Returns:
         The database, checked, its arrays read-only.
@@ -38,10 +47,20 @@ def load_database(path: str | Path | None = None) -> Database:
     Raises:
         InputError: The file is missing, not readable, or not a database the kernels could fly.
     """
+    if isinstance(path, AircraftCondition):
+        path = None if path == SHIPPED_CONDITION else _kept(path)
     missing = "run 'rtsim model build'" if path is None else "check the path"
     file = regular_file(SHIPPED if path is None else path, noun="database", largest=LARGEST_FILE, missing=missing)
     beside = file.with_name(file.stem + OWN_SUFFIX)
     return _read_once(file, _state(file), beside, _state(beside))
+
+
+def _kept(condition: AircraftCondition) -> Path:
+    file = kept_file(condition)
+    if file is None:
+        raise InputError(f"the database for {condition} is not built yet", key="database",
+                         mend=f"run 'rtsim model build {condition.flags}' here")  # fmt: skip
+    return file
 
 
 def _state(file: Path) -> str | None:
@@ -63,7 +82,7 @@ def _read(file: Path, beside: Path | None) -> Database:
         return _with_profile(database, read_profile(beside))
     if inside is not None:
         return _with_profile(database, parse_profile(str(inside), file=f"{file} ({PROFILE_ATTRIBUTE})"))
-    if file == SHIPPED:
+    if file == SHIPPED or "cg_in" in database.attributes:  # built here: the XV-15 at some condition
         return _with_profile(database, xv15_profile())
     logging.getLogger(__name__).warning(
         "%s: has no aircraft profile: it flies with the XV-15's %s and %s.", file, ", ".join(PARTS[:-1]), PARTS[-1]
@@ -79,7 +98,8 @@ def _parsed(file: Path) -> Database:
         assert database.content_hash  # goes with it
         return database
 
-    database = kept("database", f"{file.resolve()} {_state(file)}".encode(), parse)
+    with _LIBRARY:
+        database = kept("database", f"{file.resolve()} {_state(file)}".encode(), parse)
     database.freeze()
     return database
 
@@ -109,4 +129,5 @@ def save_database(database: Database, path: str | Path) -> None:
     if Path(path).suffix.lower() == ".mat":
         write_mat(database, path)
         return
-    write_database(database, path)
+    with _LIBRARY:
+        write_database(database, path)

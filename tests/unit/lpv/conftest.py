@@ -29,8 +29,10 @@ class ToyAircraft:
     states: tuple = _variables(STATES)
     inputs: tuple = _variables(INPUTS)
     outputs: tuple = _variables(("load_factor", "thrust", "wing_angle_of_attack"))
-    rotor_speed: float = 60.0
     attributes: dict = field(default_factory=lambda: {"title": "toy"})
+
+    def rotor_speed(self, _nacelle):
+        return 60.0
 
     def forces(self, x, u, n):
         collective, _, su, sw, q, _, disc, elevator = x

@@ -8,6 +8,7 @@ import pytest
 
 import rtsim
 from rtsim.aircraft.points import Condition
+from rtsim.aircraft.variables import INPUT, INPUTS
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError, TrimError
 from rtsim.lpv import lpv_kernels as kernels
@@ -111,7 +112,8 @@ def test_linear_model_has_names_and_is_the_derivative(xv15, nonlinear):
     point = xv15.trim(airspeed=airspeed, nacelle=nacelle)
     rng = np.random.default_rng(0)
     for _ in range(5):
-        dx, du = 1e-5 * rng.normal(size=17), 1e-5 * rng.normal(size=11)
+        dx, du = 1e-5 * rng.normal(size=17), 1e-5 * rng.normal(size=len(INPUTS))
+        du[INPUT.ground_effect] = 0.0  # its column is the whole effect, not a slope
         du[7], du[8] = 0.0, min(du[8], 0.0)  # 40 deg of flap is a corner: the flaps go up, or down from it
         du[9] = max(du[9], 0.0) if du[8] == 0.0 else 0.0
         change = nonlinear.derivative(point.x + dx, point.u + du, nacelle) - nonlinear.derivative(

@@ -63,7 +63,7 @@ def test_a_unit_may_be_spelled_in_several_ways(toy_database, tmp_path, unit):
     [
         ("A", lambda array: array + 1e-3j, "A: holds complex numbers; give real numbers"),
         ("nacelle", lambda array: array * 1j, "nacelle: holds complex numbers"),
-        ("rotor_speed", lambda _: np.array([60.0, 61.0]), "rotor_speed: is not one number"),
+        ("rotor_speed", lambda _: np.array([60.0, 61.0]), "rotor_speed: wrong shape"),
         ("nacelle", lambda array: array[..., ::-1], r"nacelle\[1\]: the axis does not ascend"),
         ("x_ref", lambda _: "text", "x_ref: not an array of numbers"),
     ],
