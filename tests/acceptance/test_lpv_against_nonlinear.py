@@ -77,7 +77,7 @@ def test_cruise_with_a_change_of_rotor_speed():
 
 @pytest.mark.parametrize("plant", ["lpv", "nonlinear"])
 def test_a_pilot_whose_power_is_limited_keeps_the_height(plant):
-    """Table 1 under the law `full`, which limits the torque: 5 m of height (the limit of the issue), speed gives way."""
+    """Table 1 under the law `full`, which limits the torque: 5 m of height (limit of the issue), speed gives way."""
     programme = load_scenario("typical_conversion").programme
     setup = FlightSetup(programme=programme).with_options(plant=plant, protection="full", corridor="flight")
     rows = Simulation(setup).run(round(programme.duration * 250))
