@@ -127,6 +127,7 @@ def small_database():
         layer_acceleration=whole.layer_acceleration[level],
         airspeed=whole.airspeed[speeds],
         nacelle=whole.nacelle[angles],
+        rotor_speed=whole.rotor_speed[angles],
         flap=whole.flap[np.ix_(speeds, angles)],
         pilot={
             name: replace(pilot, arrays={key: array[speeds][:, angles] for key, array in pilot.arrays.items()})

@@ -281,7 +281,7 @@ def test_the_governor_approaches_the_limit_from_below_as_one_exponential(aircraf
     flight = Flight(aircraft, [Fault(kind="engine-limit", start=0.0, power=0.0)], airspeed=150.0, nacelle=20.0)
     kernels.fault_update(flight.faults, flight.state, 0.0, flight.x, flight.actuator, 3.0, 0.0)
     along = flight.x[STATE.u] * math.cos(flight.nacelle) - flight.x[STATE.w] * math.sin(flight.nacelle)
-    slope = (200.0 + 7.5 * along / kt(1.0)) * HORSEPOWER / deg(1.0)
+    slope = (160.0 + 5.0 * along / kt(1.0)) * HORSEPOWER / deg(1.0)
     for power in (0.0, 1e6, 2e6):
         limit = kernels.collective_rate_limit(flight.faults, flight.state, flight.x, flight.nacelle, power)
         assert limit == pytest.approx(3.0 * (0.93 * 1802.0 * HORSEPOWER - power) / slope)

@@ -128,7 +128,7 @@ def test_full_takes_over_before_the_low_side_and_gives_back(tables):
     assert bench.state[data.LAW.blend] == 1.0
     assert change[1] > -0.1
     assert bench.cause("lever") == data.REASON_LOW
-    bench.sensors[SENSOR.airspeed] = kt(125.0)
+    bench.sensors[SENSOR.airspeed] = kt(115.0)
     bench.sensors[SENSOR.airspeed_rate] = 0.0
     bench.step(frames=5)
     assert 0.9 < bench.state[data.LAW.blend] < 1.0

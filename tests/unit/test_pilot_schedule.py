@@ -40,6 +40,7 @@ def part(rows: slice, columns: slice) -> Database:
         DATABASE,
         airspeed=DATABASE.airspeed[rows],
         nacelle=DATABASE.nacelle[columns],
+        rotor_speed=DATABASE.rotor_speed[columns],
         flap=DATABASE.flap[rows, columns],
         pilot={},
         **arrays,
