@@ -49,7 +49,7 @@ def test_claims_carry_numbers_and_verdicts(reproduced):
     assert json.loads((out / "claims.json").read_text(encoding="utf-8"))["claims"] == answer["claims"]
     assert all(set(claim) >= {"id", "holds", "measured", "expected", "why"} for claim in answer["claims"])
     held = {
-        "table1_timing", "fig1_corridor", "fig2_grid", "fig3_pilot", "fig4_path", "fig5_early_peak", "fig6_map",
+        "table1_timing", "fig1_corridor", "fig2_grid", "fig3_pilot", "fig4_path", "fig5_early_peak",
         "fig7_fast_side", "fig8_worse", "fig10_larger_oscillation", "fig12_collective_falls",
         "fig14_small_acceleration", "fig16_max_rate", "fig17_18_effort_time",
     }  # fmt: skip
@@ -57,9 +57,10 @@ def test_claims_carry_numbers_and_verdicts(reproduced):
     assert claims["fig5_early_peak"]["measured"]["early_peak_deg"] == pytest.approx(4.65, abs=0.3)
     assert claims["fig16_max_rate"]["measured"]["rate_deg_s"] == pytest.approx(12.0, abs=0.1)
     assert claims["fig14_small_acceleration"]["measured"]["acceleration_kt_s"] == pytest.approx(1.2, abs=0.1)
-    # Flown by us, these two do not come out as the paper says; the report tells why.
+    # Flown by us, these three do not come out as the paper says; the report tells why.
     assert not claims["fig4_least_integral"]["holds"]
     assert not claims["text_lpv_accuracy"]["holds"]
+    assert not claims["fig6_map"]["holds"]
 
 
 def test_a_file_in_the_way_is_told(tmp_path):
