@@ -84,6 +84,8 @@ def hover_ceiling(
 def climb_rate(aircraft: Xv15, condition: Condition, *, power: float, torque: float | None = None) -> Reached:
     """Fastest steady climb at an airspeed [m/s]; negative: the slowest descent, where level flight takes too much.
 
+    NaN where no descent takes as little either.
+
     Args:
         condition: Airspeed along the flight path, nacelle angle and whatever else; no acceleration.
         torque: None: what is allowed there.
@@ -101,6 +103,8 @@ def climb_rate(aircraft: Xv15, condition: Condition, *, power: float, torque: fl
         return Reached(math.nan, limit, level)
     if limit:
         descends = _furthest(_until(fly, limit), 0.0, -STEEPEST, _ANGLE_STEP, _ANGLE_WITHIN)
+        if descends.limit != limit:  # the trims end before a descent takes as little
+            return replace(descends, value=math.nan)
         return replace(descends, value=condition.airspeed * math.sin(descends.value), limit=limit)
     climbs = _furthest(fly, 0.0, STEEPEST, _ANGLE_STEP, _ANGLE_WITHIN)
     return replace(climbs, value=condition.airspeed * math.sin(climbs.value))
