@@ -46,7 +46,14 @@ def programme_at(programme: FloatArray, time: float) -> tuple[int, float]:
 
 @inner_kernel
 def programmed(programme: FloatArray, row: int, low: int, share: float) -> float:
-    """Value of one row of the programme at what ``programme_at`` found."""
+    """Value of one row of the programme at what ``programme_at`` found.
+
+    Args:
+        programme: The programme's points.
+        row: One of ``PROGRAMME``.
+        low: Number of the point before the time.
+        share: Share of the way to the next.
+    """
     if share == 0.0:
         return programme[row, low]
     return programme[row, low] + share * (programme[row, low + 1] - programme[row, low])

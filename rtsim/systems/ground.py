@@ -60,7 +60,7 @@ def load_ground_tables(profile: AircraftProfile, tables: AircraftTables) -> Grou
     lean = ((down[1] - pressed * stroke[1]) - (down[0] - pressed * stroke[0])) / wheelbase
     return GroundTables(
         active=1.0,
-        standing=float(down[1] - pressed * stroke[1] - forward[1] * lean),
+        standing=float(down[1] - pressed * stroke[1] + forward[1] * lean),
         wheels=wheels,
         friction=part.number("braked_friction", low=0.0, high=2.0),
         most_sink=part.number("limit_sink_ft_s", low=0.1, high=100.0) * FOOT,

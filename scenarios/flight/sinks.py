@@ -345,7 +345,8 @@ class FlightSinks:
         """Say when the wheels touch the ground and when they have left it; bounces in between are not told."""
         loads = rows[:, COLUMN.weight_on_wheels]
         if self._grounded is None:
-            self._grounded = bool(loads[0] > 0.0)
+            near = rows[0, COLUMN.ground_effect] > 0.0 and rows[0, COLUMN.altitude_m] < _CLEAR_OF_GROUND_M
+            self._grounded = bool(loads[0] > 0.0 or near)
         if not self._grounded and not loads.any():
             return
         for row in rows:

@@ -57,3 +57,30 @@ def test_angle_of_attack_as_third_variable_is_what_makes_it_so_close():
     plain, layered = rms_errors(programme, "lpv-plain"), rms_errors(programme)
     for signal in LIMITS:
         assert plain[signal] > 3.0 * layered[signal], (plain, layered)
+
+
+def test_cruise_with_a_change_of_rotor_speed():
+    """589 to 517 rpm on the downstop, 220 kn, and back before reconversion. Limits: the issue's, set beforehand."""
+    programme = load_scenario("cruise_rotor_speed").programme
+    truth, mine = (
+        Simulation(FlightSetup(programme=programme).with_options(plant=plant, automatic_rotor_speed=True)).run(
+            round(programme.duration * 250)
+        )
+        for plant in ("nonlinear", "lpv")
+    )
+    assert truth[:, COLUMN.rotor_speed_rpm].min() == pytest.approx(517.0, abs=1e-6)
+    np.testing.assert_allclose(mine[:, COLUMN.rotor_speed_rpm], truth[:, COLUMN.rotor_speed_rpm], atol=1e-6)
+    for name, limit in {"airspeed_kt": 0.3, "altitude_m": 0.5, "pitch_deg": 0.3, "flapping_deg": 0.1}.items():
+        column = getattr(COLUMN, name)
+        assert np.sqrt(np.mean((mine[:, column] - truth[:, column]) ** 2)) <= limit, name
+
+
+@pytest.mark.parametrize("plant", ["lpv", "nonlinear"])
+def test_a_pilot_whose_power_is_limited_keeps_the_height(plant):
+    """Table 1 under the law `full`, which limits the torque: 5 m of height (limit of the issue), speed gives way."""
+    programme = load_scenario("typical_conversion").programme
+    setup = FlightSetup(programme=programme).with_options(plant=plant, protection="full", corridor="flight")
+    rows = Simulation(setup).run(round(programme.duration * 250))
+    assert np.max(np.abs(rows[:, COLUMN.altitude_m] - 100.0)) < 5.0
+    assert np.max(rows[:, COLUMN.mast_torque_inlb]) < 130_000.0
+    assert np.min(rows[:, COLUMN.protection_lever]) < 0.0
