@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from rtsim.aircraft.condition import SHIPPED
 from rtsim.cli.output import console, progress
 
 if TYPE_CHECKING:
@@ -163,6 +164,8 @@ def describe(scenario: Scenario, *, speed: float, outputs: list[str]) -> None:
         f"plant {options.plant}, pilot {options.pilot}, outer loop {options.outer_loop}, "
         f"corridor {options.corridor_name}, protection {options.protection}, {options.rate_hz} Hz, seed {options.seed}",
     )
+    if options.condition != SHIPPED:
+        say(f"the XV-15 at {options.condition}")
     for line in outputs:
         say(line)
 

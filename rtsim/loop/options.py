@@ -362,11 +362,6 @@ class FlightOptions:
         return AircraftCondition(mass=self.mass, density_altitude=self.density_altitude, cg_forward=self.cg_forward)
 
     @property
-    def condition_shown(self) -> dict[str, float]:
-        """That by key, in the units people give it in."""
-        return {declared()[name].key: declared()[name].shown(getattr(self, name)) for name in CONDITION}
-
-    @property
     def aircraft(self) -> AircraftName:
         """What names the aircraft: the file of its database, empty for the shipped one, or a condition.
 

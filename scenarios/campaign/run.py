@@ -98,7 +98,7 @@ class CampaignResult:
             "seed": self.task.seed,
             "plant": self.task.options.plant,
             "database": self.task.options.database,
-            **self.task.options.condition_shown,
+            **self.task.options.condition.attributes,
             "database_hash": self.task.aircraft_hash,
             "corridor_name": self.task.options.corridor_name,
             "rate_hz": self.task.options.rate_hz,

@@ -126,7 +126,7 @@ class Case:
             "plant": self.scenario.options.plant,
             "database": self.scenario.options.database,
             "database_hash": _aircraft_hash(self.scenario.options),
-            **self.scenario.options.condition_shown,
+            **self.scenario.options.condition.attributes,
             "corridor_name": self.scenario.options.corridor_name,
             "failures": [finding.sentence for finding in self.failures],
             "expectations": [

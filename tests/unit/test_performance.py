@@ -88,7 +88,7 @@ def test_level_speed_of_the_airplane_is_that_of_the_cruise_torque():
 def test_the_command_shows_every_figure(capsys):
     assert run(["performance", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert set(result) == {"weight_lb", "altitude_ft", "hover_ceiling", "climb", "level_speed"}
+    assert set(result) == {"weight_lb", "altitude_ft", "cg_in", "hover_ceiling", "climb", "level_speed"}
     assert result["hover_ceiling"]["altitude_ft"] == pytest.approx(hover_ceiling(AIRCRAFT).value / FOOT)
     flown = [(90.0, 589), (75.0, 589), (0.0, 517)]
     for figures in (result["climb"], result["level_speed"]):

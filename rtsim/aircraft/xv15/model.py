@@ -126,8 +126,11 @@ class Xv15:
 
 @cache
 def _cached_tables() -> AircraftTables:
-    data = sorted((Path(__file__).parent / "data").glob("*.toml"))
-    return packed(kept("xv15", b"".join(path.read_bytes() for path in data), _plain_tables))
+    return packed(kept("xv15", _data(), _plain_tables))
+
+
+def _data() -> bytes:
+    return b"".join(path.read_bytes() for path in sorted((Path(__file__).parent / "data").glob("*.toml")))
 
 
 @cache
@@ -140,16 +143,16 @@ def _airplane_rotor_speed() -> float:
 
 @lru_cache(maxsize=8)
 def _conditioned_tables(condition: AircraftCondition) -> AircraftTables:
-    from rtsim.aircraft.xv15.data_reader import read_data
+    from rtsim.aircraft.xv15.data_reader import load_tables, read_data
 
     centre, share = read_data()[0]["cg"], SHIPPED.mass / condition.mass
     changes: dict[str, Any] = {"cg.heli_SL_in": centre["heli_SL_in"] - condition.cg_forward / INCH}
     changes |= {f"cg.{key}": centre[key] * share for key in ("shift_X_ft", "shift_Z_ft")}
-    tables = Xv15.load(changes).tables
+    tables = kept("xv15_condition", _data() + repr(changes).encode(), lambda: load_tables(changes))
     density, sound_speed = standard_atmosphere(condition.density_altitude)
     mass = tables.configuration.mass if condition.mass == SHIPPED.mass else condition.mass  # 13000.02 lb in the data
     configuration = tables.configuration._replace(mass=mass, density=density, sound_speed=sound_speed)
-    return tables._replace(configuration=configuration)
+    return packed(tables._replace(configuration=configuration))
 
 
 def _plain_tables() -> AircraftTables:

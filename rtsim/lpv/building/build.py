@@ -20,6 +20,7 @@ from rtsim.lpv.building.checks import NEIGHBOUR_LIMIT, without_poor_edges
 from rtsim.lpv.building.grid import HELICOPTER_SIDE, Grid
 from rtsim.lpv.cells import fill_invalid, quantized
 from rtsim.lpv.database import GRIDDED, Database
+from rtsim.units import to_deg
 from rtsim.worker_pool import work
 
 Guess = tuple[FloatArray, FloatArray]
@@ -229,16 +230,14 @@ def _level_row(aircraft: GridAircraft, grid: Grid, number: int, before: Row) -> 
 
 def _beginning(aircraft: GridAircraft, grid: Grid, number: int, wanted: Sequence[int]) -> tuple[int, GridPoint]:
     """Where the continuation begins: as near as there is a trim to where a row is started from."""
-    nacelle, best = float(grid.nacelle[number]), _seed(grid, number, wanted)
-    for v in sorted(wanted, key=lambda v: abs(grid.airspeed[v] - grid.airspeed[best])):
+    nacelle, usual = float(grid.nacelle[number]), float(grid.airspeed[_seed(grid, number, wanted)])
+    for v in sorted(wanted, key=lambda v: abs(grid.airspeed[v] - usual)):
         point = _attempt(aircraft, grid, (v, nacelle, 0.0), [None], [])
         if point is not None:
             return v, point
     raise TrimError(
-        "the continuation found no trim to start from",
-        key="airspeed, nacelle",
-        value=(float(grid.airspeed[best]), nacelle),
-        mend="check the aircraft data; it may be too heavy for this air",
+        f"there is no trim to start from at nacelle {to_deg(max(nacelle, 0.0)):.4g} deg, whatever the airspeed",
+        mend="the aircraft may be too heavy for this air; else check its data",
     )
 
 

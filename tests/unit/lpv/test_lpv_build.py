@@ -77,8 +77,32 @@ def test_only_wanted_cells_are_solved(toy_aircraft, toy_grid):
 
 
 def test_no_start_is_told(toy_aircraft, toy_grid):
-    with pytest.raises(TrimError, match="found no trim to start from"):
+    with pytest.raises(TrimError, match="there is no trim to start from at nacelle 90 deg"):
         build_database(FoldingAircraft(_Hopeless(toy_aircraft), 0.0), toy_grid, jobs=1)
+
+
+def test_trims_begin_where_there_is_one_nearest_to_hover(toy_aircraft, toy_grid, toy_database):
+    """Too heavy to hover: the slow cells are invalid, the others as they would be."""
+    heavy = _TooHeavy(toy_aircraft, 12.0)
+    database = build_database(heavy, toy_grid, jobs=1, edge_limit=None)
+    slow = np.abs(toy_grid.airspeed) < heavy.slowest
+    assert slow.any()
+    assert not database.valid[:, slow].any()
+    both = database.valid & toy_database.valid
+    assert both[database.level_layer].sum() > 0.5 * toy_database.valid[database.level_layer].sum()
+    np.testing.assert_allclose(database.x_ref[both], toy_database.x_ref[both], atol=1e-6)
+
+
+@dataclass(frozen=True)
+class _TooHeavy:
+    toy: object
+    slowest: float
+
+    def __getattr__(self, name):
+        return getattr(self.toy, name)
+
+    def solve(self, airspeed, *rest):
+        return None if abs(airspeed) < self.slowest else self.toy.solve(airspeed, *rest)
 
 
 @dataclass(frozen=True)
