@@ -92,6 +92,7 @@ def coarse(database: Database) -> Database:
         database,
         airspeed=database.airspeed[v],
         nacelle=database.nacelle[n],
+        rotor_speed=database.rotor_speed[n],
         flap=database.flap[np.ix_(v, n)],
         pilot={},
         **arrays,

@@ -20,6 +20,7 @@ from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, MOTION, PART, PROGRAMME, REFERENCE, STATION, Flight
 from rtsim.loop.observe_kernels import programme_at, programmed
+from rtsim.nacelle.automatic_kernels import scheduled_angle
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.protection import law_data as law
@@ -262,16 +263,24 @@ def _turn_systems(flight: Flight) -> None:
 
 @inner_kernel
 def _nacelles_leave(flight: Flight) -> bool:
-    """Whether somebody asks the nacelles off the downstop, or the programme will before the rotors are back up."""
-    tables, state = flight.tables, flight.state
-    if flight.scratch.command[STATION.protected, CHANNEL.nacelle_rate] > 0.0:
+    """Whether somebody asks the nacelles off the downstop, or is to do so before the rotors would be back up."""
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    if scratch.command[STATION.protected, CHANNEL.nacelle_rate] > 0.0:
         return True
-    if state.clock[CLOCK.mode] != MODE.mocm or tables.automatic.active != 0:
-        return False
     drive = tables.drive
-    back = (-drive.slow_offset / drive.change_rate + _SPARE_S) + state.clock[CLOCK.frame] * tables.dt
-    low, share = programme_at(tables.programme, back)
-    return programmed(tables.programme, PROGRAMME.nacelle, low, share) > LOCKED
+    ahead = -drive.slow_offset / drive.change_rate + _SPARE_S
+    if tables.automatic.active != 0:
+        airspeed = scratch.shown[0] + ahead * min(scratch.y[OUTPUT.airspeed_rate], 0.0)
+        return scheduled_angle(tables.automatic, airspeed) > LOCKED
+    if state.clock[CLOCK.mode] != MODE.mocm:
+        return False
+    programme, now = tables.programme, state.clock[CLOCK.frame] * tables.dt
+    low, share = programme_at(programme, now + ahead)
+    leaves = programmed(programme, PROGRAMME.nacelle, low, share) > LOCKED
+    for point in range(programme.shape[1]):
+        within = now <= programme[PROGRAMME.time, point] <= now + ahead
+        leaves = leaves or (within and programme[PROGRAMME.nacelle, point] > LOCKED)
+    return leaves
 
 
 @inner_kernel
@@ -354,8 +363,10 @@ def _end_code(flight: Flight) -> int:
         upright = (
             abs(pitch) <= LANDING_PITCH and state.nacelle[1] >= LANDING_NACELLE and abs(ground_speed) <= LANDING_SPEED
         )
-        if not (upright and sink <= (tables.ground.most_sink if stands else HARD_SINK_RATE)):
+        if sink > (tables.ground.most_sink if stands else HARD_SINK_RATE) or not (upright or stands):
             return END.crash
+        if not upright:
+            return END.aground
         if not stands:
             return END.gentle_landing if sink <= GENTLE_SINK_RATE else END.hard_landing
     rotor_speed = rotor_speed_now(drive, state.drive)

@@ -33,12 +33,13 @@ coming frame needs and that is not compiled yet (1 + its place in ``PART``; 0 no
 REFERENCE = Places("airspeed", "rate")
 """The filtered airspeed reference [m/s] and its rate [m/s^2]."""
 END = Places(
-    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast"
+    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast", "aground"
 )  # fmt: skip
 """Why a flight ended by itself."""
 END_REASONS = {
     END.none: "",
     END.crash: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
+    END.aground: "came to grief on the ground: pitch beyond 15 deg, nacelles below 60 deg or faster than 60 kn",
     END.attitude: "control was lost: pitch attitude beyond 80 deg",
     END.not_finite: "the model diverged: a state is no longer a finite number",
     END.gentle_landing: "touched down gently, sinking at {sink:.1f} m/s",

@@ -19,8 +19,8 @@ from rtsim.choices import BUILT_IN_PILOT, HAND_PILOT, PASSIVE_LAWS, AidName, Cor
 from rtsim.errors import InputError, suggestion
 from rtsim.units import FOOT, INCH, KNOT, POUND, POUND_FORCE, RPM
 
-FULL_ROTOR_SPEED = 589.0 * RPM
-"""Rotor speed of a flight that is asked for none: the XV-15's in conversion, and another aircraft's own [rad/s]."""
+FULL_ROTOR_SPEED = 0.0
+"""Rotor speed of a flight that is asked for none: the aircraft's own in conversion [rad/s]."""
 FULL_TANKS = 1490.0 * POUND_FORCE
 """Fuel of a flight that is asked for none: the XV-15's full tanks, and another aircraft's own [N]."""
 CONDITION = ("mass", "density_altitude", "cg_forward")

@@ -16,6 +16,7 @@ from rtsim.loop.data import CHANNEL, CLOCK, KNOWN, MOTION, STATION, Flight
 from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
+from rtsim.protection.law_data import LAW
 from rtsim.protection.law_kernels import law_decide, law_watch
 from rtsim.systems.drive_kernels import governor_power, rotor_speed_now
 from rtsim.systems.flap_kernels import flap_now, flap_parts
@@ -59,6 +60,7 @@ def watch_law(flight: Flight) -> float:
         flight: The flight with its sensors.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
+    state.protection[LAW.shift] = scratch.known[KNOWN.place] - scratch.motion[MOTION.angle]
     law_watch(tables.protection, state.protection, scratch.sensors, scratch.command[STATION.aided], scratch.law)
     return 0.0
 
@@ -71,6 +73,7 @@ def decide_law(flight: Flight) -> float:
         flight: The flight with its sensors.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
+    state.protection[LAW.shift] = scratch.known[KNOWN.place] - scratch.motion[MOTION.angle]
     law_decide(tables.protection, state.protection, scratch.sensors, scratch.command[STATION.aided], scratch.law)
     return 0.0
 

@@ -74,7 +74,7 @@ from rtsim.systems.drive_kernels import DRIVE_STATE_SIZE, GOVERNED, HELD_OFFSET,
 from rtsim.systems.engine import load_engine_tables
 from rtsim.systems.flap_kernels import FLAP_FOLLOWS, FLAP_SETTING, FLAP_STATE_SIZE, NO_SETTING
 from rtsim.systems.ground import light_on_wheels, load_ground_tables, no_ground
-from rtsim.systems.requests import held_offset
+from rtsim.systems.requests import check_slow_rotors, held_offset
 from rtsim.systems.settings import load_drive_tables, load_flap_tables
 from rtsim.units import to_deg, to_kt
 
@@ -207,6 +207,8 @@ def build_parts(setup: FlightSetup) -> Parts:
     own = Xv15.under(AircraftCondition.stored(loaded.attributes)).tables
     airspeed, nacelle, altitude = _start(setup)
     drive = load_drive_tables(profile, rotor_speed=database.rotor_speed, nacelle=database.nacelle, nonlinear=nonlinear)
+    if options.automatic_rotor_speed:
+        check_slow_rotors(drive)
     offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
     x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle, held))

@@ -34,7 +34,14 @@ from rtsim.protection.chain import ChainSnapshot, LawChain, compiled_law
 from rtsim.protection.law_data import LAW
 from rtsim.protection.laws import load_laws
 from rtsim.systems.flap_kernels import FLAP_SETTING
-from rtsim.systems.requests import check_flap_setting, flap_setting, next_flap_setting, set_held_speed, trim_throttle
+from rtsim.systems.requests import (
+    check_flap_setting,
+    check_slow_rotors,
+    flap_setting,
+    next_flap_setting,
+    set_held_speed,
+    trim_throttle,
+)
 
 Disturbance = Gust | Turbulence | FaultSwitch
 """What can be done to a flight from outside besides its commands; each is a recorded event."""
@@ -266,6 +273,8 @@ class Simulation:
         place = SWITCHES[switch_of(name)]
         if not on and name in self._parts.needed_aids:
             raise needed_aid_error(name)
+        if on and name == "automatic_rotor_speed":
+            check_slow_rotors(self.tables.drive)
         self._state.switches[place] = 1.0 if on else 0.0
 
     def set_flaps(self, angle: float) -> None:

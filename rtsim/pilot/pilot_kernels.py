@@ -298,8 +298,9 @@ def mocm_advance_in(
         overruled = applied[hand] - (trim[1 + hand] + demand(tables, state, hand))
         if abs(overruled) > SAME_CONTROL:
             # Less power than asked for, and slower than wanted: the pilot is told, and lets the speed go.
-            short = short or (hand == LEVER and overruled < 0.0 and error_v < 0.0)
-            frozen = frozen or not (hand == LEVER and overruled < 0.0 and error_v < 0.0)
+            less = hand == LEVER and overruled < 0.0 and error_v < 0.0 and airspeed < reference[TARGET.airspeed]
+            short = short or less
+            frozen = frozen or not less
             for k in range(n):
                 held.plant[k] += gains.B[pad4(n) * hand + k] * overruled
     if noisy:

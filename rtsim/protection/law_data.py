@@ -47,6 +47,7 @@ LAW = Places(
     "flap_bias",
     "recover_side",
     "override",  # 1: the pilot has switched the law's authority off
+    "shift",  # place on the database's nacelle axis less the nacelle angle: below 0 while the rotors are slow [rad]
     "kind",  # how the nacelle rate was limited: 0 limit, 1 reverse
 )
 """Places in the law's state."""

@@ -106,7 +106,7 @@ def _look_ahead(
         state[LAW.collective] = asked[1]
         state[LAW.last_nacelle_rate] = rate
     acting = (state[LAW.acted_stick], state[LAW.acted_lever])
-    model_at(tables.model, airspeed, angle, cell)
+    model_at(tables.model, airspeed, angle + state[LAW.shift], cell)
 
     _, _, _, expected, _ = accelerations(cell, z, acting, (0.0, rate))
     missing = clip(sensors[SENSOR.airspeed_rate] - expected, -settings.bias_limit, settings.bias_limit)

@@ -209,7 +209,7 @@ def _recover(
         # Height is not traded for speed beyond the allowed descent.
         step *= max(0.0, 1.0 - excess / allowed)
         state[LAW.blend_reason] = REASON_SINK
-    model_at(tables.model, airspeed + step, angle, target)
+    model_at(tables.model, airspeed + step, angle + state[LAW.shift], target)
     d0 = z[0] - target[model.CELL.state]
     d1 = z[1] - target[model.CELL.state + 1]
     d2 = z[2] - target[model.CELL.state + 2]

@@ -106,9 +106,13 @@ def held_advance(
     """
     state[HELD_POWER] = 0.0
     if state[GOVERNED] == 0.0:
+        if state[HELD_OFFSET] < 0.0 and state[HELD_OFFSET] + state[DEVIATION] >= 0.0:
+            # Back at full speed without the governor: from here on that is what the deviation is counted from.
+            state[DEVIATION] += state[HELD_OFFSET]
+            state[HELD_OFFSET] = state[HELD_SETTING] = 0.0
         return
     wanted = state[HELD_SETTING]
-    if automatic or angle > LOCKED:
+    if automatic or leaving or angle > LOCKED:
         wanted = tables.slow_offset if automatic and angle <= LOCKED and not leaving else 0.0
         state[HELD_SETTING] = wanted
     if wanted == state[HELD_OFFSET]:

@@ -78,6 +78,22 @@ def trim_throttle(state: FloatArray, share: float) -> None:
     state[THROTTLE_TRIM] = share
 
 
+def check_slow_rotors(tables: DriveTables) -> None:
+    """Refuse a rotor speed of airplane mode where the aircraft has none.
+
+    Raises:
+        InputError: The database has one rotor speed.
+    """
+    if tables.slow_offset == 0.0:
+        raise InputError(
+            "cannot be switched on: the database has one rotor speed",
+            key="automatic_rotor_speed",
+            value="on",
+            allowed="off",
+            mend="give it rows of lower rotor speed below nacelle 0 (docs/lpv.md)",
+        )
+
+
 def held_offset(tables: DriveTables, speed: float, nacelle: float) -> float:
     """What a rotor speed to hold is less than the governed one [rad/s].
 

@@ -50,7 +50,21 @@ if TYPE_CHECKING:
 
 beside.also("rtsim.measures.metrics:compile_measures")
 TOLD_TO_STATIONS = frozenset(
-    {"pilot", "aid", "flaps", "throttle", "rotor_speed", "refused", "advice", "end", "freeze", "thaw", "fuel", "wheels"}
+    {
+        "pilot",
+        "aid",
+        "flaps",
+        "throttle",
+        "rotor_speed",
+        "refused",
+        "advice",
+        "end",
+        "freeze",
+        "thaw",
+        "fuel",
+        "wheels",
+        "interlock",
+    }
 )
 """Events that ground stations are told of as text."""
 VIEW_PATIENCE_S = 1.5

@@ -232,6 +232,7 @@ class FlightSinks:
         self._level = 0.0
         self._fuel = 0.0
         self._grounded: bool | None = None
+        self._waiting = False
         self._no_timing = np.full(len(TIMING_SIGNALS), np.nan)
 
     def view(self, row: FloatArray, timing: FloatArray) -> None:
@@ -258,6 +259,7 @@ class FlightSinks:
             self._tell_level(row)
         self._watch_fuel(row[None, :])
         self._watch_wheels(row[None, :])
+        self._watch_interlock(row[None, :])
         if self._limits is not None:
             self._limits.row(row)
         if self._on_rows is not None:
@@ -281,6 +283,7 @@ class FlightSinks:
                 self._tell_level(rows[number])
         self._watch_fuel(rows)
         self._watch_wheels(rows)
+        self._watch_interlock(rows)
         if self._limits is not None:
             self._limits.flush()
             self._limits.rows(rows)
@@ -356,6 +359,19 @@ class FlightSinks:
             self._grounded = bool(touching)
             text = f"touched down, sinking at {-row[COLUMN.climb_rate_m_s]:.2f} m/s" if touching else "lifted off"
             self.event(LogEvent(int(row[COLUMN.frame]), float(row[COLUMN.time_s]), "wheels", text, "info", {}))
+
+    def _watch_interlock(self, rows: FloatArray) -> None:
+        """Say once that nacelles which are asked off the downstop wait for the rotors."""
+        asked = (rows[:, COLUMN.pilot_nacelle_rate_rad_s] > 0.0) & (rows[:, COLUMN.on_downstop] != 0.0)
+        alone = (rows[:, COLUMN.protection_nacelle_rate_deg_s] == 0.0) & (rows[:, COLUMN.failures] == 0.0)
+        waits = asked & alone & (rows[:, COLUMN.nacelle_command_rate_deg_s] == 0.0)
+        if not waits.any():
+            self._waiting = self._waiting and bool(asked[-1])
+        elif not self._waiting:
+            self._waiting = True
+            row = rows[int(np.argmax(waits))]
+            text = f"the nacelles wait on the downstop for the rotors, {row[COLUMN.rotor_speed_rpm]:.0f} rpm"
+            self.event(LogEvent(int(row[COLUMN.frame]), float(row[COLUMN.time_s]), "interlock", text, "warning", {}))
 
     def _tell_level(self, row: FloatArray) -> None:
         level = int(row[COLUMN.corridor_level])

@@ -16,7 +16,7 @@ TEXT_LENGTH = 50
 _TEXTS_PER_S, _TEXT_BURST, _MOST_WAITING = 2.0, 4.0, 12
 _FLAPPING_WARNING_DEG, _FLAPPING_CLEAR_DEG = 10.0, 9.0
 _TORQUE_WARNING_PCT, _TORQUE_CLEAR_PCT = 100.0, 97.0
-_ROTOR_LOW_PCT, _ROTOR_HIGH_PCT, _ROTOR_CLEAR_PCT = 95.0, 105.0, 1.0
+_ROTOR_SLOW_PCT, _ROTOR_LOW_PCT, _ROTOR_HIGH_PCT, _ROTOR_CLEAR_PCT = 84.0, 95.0, 105.0, 1.0
 """Rotor speed outside these is worth a warning; ours, no operating limits were found."""
 FLAP_SPEEDS = ((0.0, 260.0), (20.0, 220.0), (40.0, 170.0), (75.0, 100.0))
 """Flap setting [deg] and the fastest airspeed with it [kn] (NASA TM X-62407, TM 81244; as the aircraft's data)."""
@@ -112,7 +112,8 @@ class NoticeBoard:
         """Say when the rotors without their governor, or flaps by hand, are where they should not be."""
         rotor = state.rotor_speed_pct
         slack = _ROTOR_CLEAR_PCT if self._rotor else 0.0
-        off_speed = not _ROTOR_LOW_PCT + slack <= rotor <= _ROTOR_HIGH_PCT - slack
+        low = _ROTOR_SLOW_PCT if state.value("on_downstop") else _ROTOR_LOW_PCT
+        off_speed = not low + slack <= rotor <= _ROTOR_HIGH_PCT - slack
         if off_speed and not self._rotor:
             self.say(WARNING, f"Rotor speed {rotor:.0f} %")
         flap, airspeed = state.value("flap_deg"), state.value("airspeed_kt")

@@ -9,6 +9,7 @@ import pytest
 
 import scenarios
 from rtsim.aircraft.profile import read_profile
+from rtsim.aircraft.xv15.model import Xv15
 from rtsim.command import Command
 from rtsim.errors import InputError
 from rtsim.frame import COLUMN
@@ -74,4 +75,4 @@ def test_a_flight_says_when_the_wheels_touch_and_leave():
 def test_an_aircraft_without_gear_is_refused():
     profile = read_profile(Path(__file__).parents[2] / "examples" / "second_tiltrotor" / "two_thirds.profile.toml")
     with pytest.raises(InputError, match="no landing gear"):
-        load_ground_tables(profile, mass=1000.0)
+        load_ground_tables(profile, Xv15.load().tables)

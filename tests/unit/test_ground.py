@@ -14,8 +14,7 @@ from rtsim.systems import ground_kernels as kernels
 from rtsim.systems.ground import light_on_wheels, load_ground_tables
 from rtsim.units import FOOT, GRAVITY, deg, kt
 
-MASS = Xv15.load().tables.configuration.mass
-GROUND = load_ground_tables(xv15_profile(), mass=MASS)
+GROUND = load_ground_tables(xv15_profile(), Xv15.load().tables)
 
 
 def contact(altitude, *, pitch=0.0, w=0.0, u=0.0, q=0.0):
