@@ -327,7 +327,7 @@ def needed_inputs_error(key: str, value: str, allowed: str, inputs: Sequence[str
         inputs: Inputs that the database lacks.
     """
     return InputError(
-        f"cannot be {value}: the database does not say what the aircraft does then",
+        f"cannot be switched {value}: the database does not say what the aircraft does then",
         key=key,
         value=value,
         allowed=allowed,

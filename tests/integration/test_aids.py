@@ -176,7 +176,7 @@ def test_flaps_by_hand_do_not_pitch_the_aircraft(plant: str) -> None:
 
 
 def test_altitude_hold_keeps_the_height_through_a_conversion() -> None:
-    """From hover to 60 deg of nacelle along the centre line the lever comes back by a third of its travel by itself."""
+    """From hover to 65 deg of nacelle along the centre line the lever comes back by a third of its travel by itself."""
     simulation = Simulation(setup(0, 90, aids=(*STABILITY, "altitude_hold")))
     lever = float(simulation._state.u[1])
     schedule = transition_schedule(load_corridor("design"))
@@ -186,7 +186,7 @@ def test_altitude_hold_keeps_the_height_through_a_conversion() -> None:
         return Command(0.0, lever, float(np.clip(wanted - sensors.nacelle_angle, -deg(3.0), 0.0)))
 
     rows = fly_hold(simulation, 90.0, hands)
-    assert rows[-1, COLUMN.nacelle_deg] < 62.0
+    assert rows[-1, COLUMN.nacelle_deg] < 65.0
     assert rows[-1, COLUMN.lever] < lever - 0.25
     np.testing.assert_allclose(rows[:, COLUMN.altitude_m], 100.0, atol=5.0)
 
