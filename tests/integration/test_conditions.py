@@ -85,6 +85,7 @@ def test_both_plants_are_the_same_aircraft(kept: Path) -> None:
 def test_a_worker_without_the_database_says_so(kept: Path) -> None:
     from rtsim.loop.options import FlightOptions
 
+    _hover("lpv")  # built, where no test before did
     task = Task("", "", (), 0, FlightOptions(**ASKED))
     assert task_identity(task)["database"] == load_database(CONDITION).aircraft_hash
     elsewhere = replace(task, options=FlightOptions(**{**ASKED, "cg_forward": 0.0}))
