@@ -25,7 +25,15 @@ from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
-from rtsim.systems.drive_kernels import HELD_OFFSET, LOCKED, drive_advance, engine_power, held_advance, rotor_speed_now
+from rtsim.systems.drive_kernels import (
+    HELD_OFFSET,
+    LOCKED,
+    drive_advance,
+    engine_power,
+    held_advance,
+    held_moves,
+    rotor_speed_now,
+)
 from rtsim.systems.engine_kernels import burn
 from rtsim.systems.flap_kernels import flap_advance
 from rtsim.systems.ground_kernels import touches
@@ -255,8 +263,8 @@ def _turn_systems(flight: Flight) -> None:
     lever = scratch.command[STATION.acting, CHANNEL.lever]
     available = state.faults[FAULT.power] if state.faults[FAULT.engine] != 0.0 else tables.drive.power[-1]
     drive_advance(tables.drive, state.drive, governed, torque, lever, available, tables.dt)
-    if tables.drive.slow_offset != 0.0:
-        lowers = state.switches[AUTOMATIC_ROTOR_SPEED] != 0.0
+    lowers = state.switches[AUTOMATIC_ROTOR_SPEED] != 0.0
+    if tables.drive.slow_offset != 0.0 and (lowers or held_moves(state.drive)):
         angle = scratch.motion[MOTION.angle]
         held_advance(tables.drive, state.drive, lowers, angle, _nacelles_leave(flight), tables.dt)
 

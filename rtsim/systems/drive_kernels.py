@@ -93,6 +93,16 @@ def schedule_angle(tables: DriveTables, state: FloatArray, angle: float) -> floa
 
 
 @inner_kernel
+def held_moves(state: FloatArray) -> bool:
+    """Whether the held rotor speed is, or is to be, another than the governed one: in most flights it never is.
+
+    Args:
+        state: Drive state.
+    """
+    return state[HELD_OFFSET] != 0.0 or state[HELD_SETTING] != 0.0 or state[HELD_POWER] != 0.0
+
+
+@inner_kernel
 def held_advance(
     tables: DriveTables, state: FloatArray, automatic: bool, angle: float, leaving: bool, dt: float
 ) -> None:
