@@ -1,6 +1,10 @@
-"""States, inputs and outputs as data: name, unit, meaning and role; and those of the symmetric-plane XV-15.
+"""States, inputs and outputs as data: name, unit, meaning and role; and those of the XV-15.
 
 Whoever needs a group of them selects by role, never by "all but" and never by where they stand.
+
+Motion in the plane of symmetry and out of it are two lists. What the two rotors do is told as the mean of both, which
+is symmetric, and as half the difference right less left, each rotor seen in its own mirrored frame, which is lateral:
+every lateral variable changes its sign in a mirror, so that the two halves of a linear model do not meet.
 """
 
 from __future__ import annotations
@@ -100,6 +104,57 @@ OUTPUTS: tuple[Variable, ...] = (
     Variable("flapping", "rad", "Magnitude of the gimbal flapping relative to the mast", "rotor"),
 )
 
+_HALF_DIFFERENCE = "Half difference right less left: "
+LATERAL_STATES: tuple[Variable, ...] = (
+    Variable("v", "m/s", "Air-relative velocity along the body y axis (right)", "rigid"),
+    Variable("p", "rad/s", "Body roll rate, right positive", "rigid"),
+    Variable("r", "rad/s", "Body yaw rate, nose right positive", "rigid"),
+    Variable("bank", "rad", "Bank angle, right positive", "rigid"),
+    Variable("heading", "rad", "Heading, clockwise from north, not wrapped", "navigation"),
+    Variable("coning_difference", "rad", _HALF_DIFFERENCE + "coning", "rotor"),
+    Variable("coning_rate_difference", "rad/s", _HALF_DIFFERENCE + "rate of the coning", "rotor"),
+    Variable("flap_1c_difference", "rad", _HALF_DIFFERENCE + "cosine flapping", "rotor"),
+    Variable("flap_1c_rate_difference", "rad/s", _HALF_DIFFERENCE + "rate of the cosine flapping", "rotor"),
+    Variable(
+        "flap_1s_difference", "rad", _HALF_DIFFERENCE + "sine flapping; positive lifts the outboard edge", "rotor"
+    ),
+    Variable("flap_1s_rate_difference", "rad/s", _HALF_DIFFERENCE + "rate of the sine flapping", "rotor"),
+    Variable("inflow_0_difference", "", _HALF_DIFFERENCE + "mean induced velocity over tip speed", "inflow"),
+    Variable("inflow_1c_difference", "", _HALF_DIFFERENCE + "fore-aft gradient of the induced velocity", "inflow"),
+    Variable("inflow_1s_difference", "", _HALF_DIFFERENCE + "lateral gradient of the induced velocity", "inflow"),
+    Variable("collective_difference", "rad", _HALF_DIFFERENCE + "collective pitch", "actuator"),
+    Variable("cyclic_difference", "rad", _HALF_DIFFERENCE + "longitudinal cyclic pitch", "actuator"),
+    Variable("aileron", "rad", "Aileron (half difference of the flaperons), right one up positive", "actuator"),
+    Variable("rudder", "rad", "Rudder, positive turns the nose right", "actuator"),
+)
+"""States of the motion out of the plane of symmetry; all zero in symmetric flight."""
+PLACE_STATES: tuple[Variable, ...] = (
+    Variable("north", "m", "Place north of the start", "navigation"),
+    Variable("east", "m", "Place east of the start", "navigation"),
+)
+"""Where the aircraft is over the ground: moved by the motion over the ground and acting on nothing."""
+LATERAL_INPUTS: tuple[Variable, ...] = (
+    Variable("lateral_stick", "", "Lateral stick, -1 left to 1 right", "pilot"),
+    Variable("pedal", "", "Pedals, -1 left to 1 right", "pilot"),
+    Variable("gust_v", "m/s", "Gust added to the air-relative velocity along body y", "gust"),
+    Variable("gust_p", "rad/s", "Gust added to the air-relative roll rate", "gust"),
+    Variable("gust_r", "rad/s", "Gust added to the air-relative yaw rate", "gust"),
+    Variable("contact_y", "m/s^2", "Force of the ground on the wheels along body y over mass", "ground"),
+    Variable("contact_roll", "rad/s^2", "Roll acceleration by it", "ground"),
+    Variable("contact_yaw", "rad/s^2", "Yaw acceleration by it", "ground"),
+)
+"""Inputs that act out of the plane of symmetry."""
+LATERAL_OUTPUTS: tuple[Variable, ...] = (
+    Variable("thrust_difference", "N", _HALF_DIFFERENCE + "thrust of a rotor", "rotor"),
+    Variable("torque_difference", "N m", _HALF_DIFFERENCE + "torque of a mast", "rotor"),
+    Variable("side_force", "", "Lateral load factor: specific force along body y over g", "body"),
+)
+"""Outputs that are zero in symmetric flight."""
+ALL_STATES = (*STATES, *LATERAL_STATES, *PLACE_STATES)
+"""What a flight carries: the symmetric states first."""
+ALL_INPUTS = (*INPUTS, *LATERAL_INPUTS)
+ALL_OUTPUTS = (*OUTPUTS, *LATERAL_OUTPUTS)
+
 
 def of_role(variables: Sequence[Variable], *roles: str) -> tuple[int, ...]:
     """Positions of the variables that have one of some roles.
@@ -171,7 +226,7 @@ def with_roles(kind: str, variables: Sequence[Variable]) -> tuple[Variable, ...]
 
 _KNOWN_ROLES = {
     kind: {variable.name: variable.role for variable in variables}
-    for kind, variables in (("state", STATES), ("input", INPUTS), ("output", OUTPUTS))
+    for kind, variables in (("state", ALL_STATES), ("input", ALL_INPUTS), ("output", ALL_OUTPUTS))
 }
 
 
@@ -195,9 +250,9 @@ GROUND_INPUTS = _names(INPUTS, "ground")
 AUXILIARY_INPUTS = _names(INPUTS, "flap", "drive", "ground")
 """Inputs that are zero while flaps and rotor speed are where schedule and governor have them, away from the ground."""
 
-STATE = Places(*(variable.name for variable in STATES))
+STATE = Places(*(variable.name for variable in ALL_STATES))
 """Index of a state by name, usable in compiled kernels."""
-INPUT = Places(*(variable.name for variable in INPUTS))
+INPUT = Places(*(variable.name for variable in ALL_INPUTS))
 """Index of an input by name."""
-OUTPUT = Places(*(variable.name for variable in OUTPUTS))
+OUTPUT = Places(*(variable.name for variable in ALL_OUTPUTS))
 """Index of an output by name."""

@@ -15,7 +15,16 @@ from rtsim.aids.design import design_aids, switches_of
 from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.controls import control_tables
 from rtsim.aircraft.points import Condition
-from rtsim.aircraft.variables import FLAP_INPUTS, GROUND_INPUTS, INPUTS, OUTPUTS, STATE, STATES, of_role
+from rtsim.aircraft.variables import (
+    ALL_INPUTS,
+    ALL_OUTPUTS,
+    ALL_STATES,
+    FLAP_INPUTS,
+    GROUND_INPUTS,
+    STATE,
+    Variable,
+    of_role,
+)
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.arrays import FloatArray
@@ -211,7 +220,8 @@ def build_parts(setup: FlightSetup) -> Parts:
         check_slow_rotors(drive)
     offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
-    x, u = (array.copy() for array in start_trim(nonlinear, database, airspeed, nacelle, held))
+    trim = start_trim(nonlinear, database, airspeed, nacelle, held)
+    x, u = (_widened(part, variables) for part, variables in zip(trim, (ALL_STATES, ALL_INPUTS), strict=True))
     ground = load_ground_tables(profile, own) if options.ground else no_ground()
     if options.ground:
         if not nonlinear and not meets_ground(loaded):
@@ -261,20 +271,25 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
+def _widened(symmetric: FloatArray, variables: Sequence[Variable]) -> FloatArray:
+    """A copy with zeros for what is not symmetric."""
+    return np.concatenate([symmetric, np.zeros(len(variables) - symmetric.size)])
+
+
 def new_scratch(tables: SimulationTables) -> Scratch:
     """Work space for a flight.
 
     Args:
         tables: What flies.
     """
-    states = len(STATES)
+    states = len(ALL_STATES)
     work = nonlinear_kernels.WORK_COUNT + 6 * states
     lpv = tables.plant.aircraft.target
     if hasattr(lpv, "cells"):
         work = max(work, interpreted(work_size)(lpv))
     return Scratch(
         work=np.zeros(work),
-        y=np.zeros(len(OUTPUTS)),
+        y=np.zeros(len(ALL_OUTPUTS)),
         xdot=np.zeros(states),
         path=np.zeros((3, 3)),
         motion=np.zeros(MOTION.size),
@@ -348,7 +363,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     clock = np.zeros(CLOCK.size)
     clock[CLOCK.mode] = MODES["mocm" if options.mocm_begins else "external"]
     u = parts.start_u.copy()
-    u[[place for place in range(len(INPUTS)) if place not in of_role(INPUTS, "pilot")]] = 0.0
+    u[[place for place in range(len(ALL_INPUTS)) if place not in of_role(ALL_INPUTS, "pilot")]] = 0.0
     held = np.full(HELD.size, np.nan)
     held[HELD.stick_reason :] = 0.0
     state = SimulationState(
