@@ -7,8 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile
-from rtsim.aircraft.smooth_tables import smooth_curves
-from rtsim.aircraft.xv15.data_reader import NACELLE_GRID
+from rtsim.aircraft.smooth_tables import NACELLE_GRID, smooth_curves
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.aircraft.xv15.tables import ControlTables
 from rtsim.units import deg, kt

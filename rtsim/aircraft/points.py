@@ -61,3 +61,17 @@ class LinearModel:
     """Feed-through."""
     df_dnacelle: FloatArray
     """Derivative of the state derivative with nacelle angle."""
+
+
+@dataclass(frozen=True, slots=True)
+class LateralModel:
+    """Jacobians out of the plane of symmetry at a symmetric state, gravity and Coriolis terms included."""
+
+    A: FloatArray
+    """State matrix, order of ``variables.LATERAL_STATES``."""
+    B: FloatArray
+    """Input matrix, order of ``variables.LATERAL_INPUTS``."""
+    C: FloatArray
+    """Output matrix, order of ``variables.LATERAL_OUTPUTS``."""
+    D: FloatArray
+    """Feed-through."""

@@ -11,6 +11,10 @@ import numpy as np
 
 from rtsim.aircraft.table_kernels import Curves, Surfaces
 from rtsim.arrays import FloatArray
+from rtsim.units import deg
+
+NACELLE_GRID = np.radians(np.arange(0.0, 96.0, 1.0))
+"""Uniform grid of what depends on the nacelle angle [rad]."""
 
 
 def smooth_curves(arguments: Sequence[Sequence[float]], values: Sequence[Sequence[float]], grid: FloatArray) -> Curves:
@@ -33,6 +37,17 @@ def smooth_curves(arguments: Sequence[Sequence[float]], values: Sequence[Sequenc
         rows.append(interpolant(inside))
         slopes.append(np.where((grid >= nodes[0]) & (grid <= nodes[-1]), interpolant(inside, 1), 0.0))
     return Curves(float(grid[0]), float(grid[1] - grid[0]), np.array(rows), np.array(slopes))
+
+
+def against_nacelle(mast_deg: Sequence[float], rows: Sequence[Sequence[float]]) -> Curves:
+    """Curves printed against the mast angle (0 helicopter, 90 airplane), turned round to run against nacelle angle.
+
+    Args:
+        mast_deg: Mast angles of the print [deg], ascending.
+        rows: Values of each curve.
+    """
+    nacelle = [deg(90.0 - b) for b in reversed(mast_deg)]
+    return smooth_curves([nacelle] * len(rows), [list(reversed(row)) for row in rows], NACELLE_GRID)
 
 
 def smooth_surface(

@@ -12,6 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.places import Places
 
@@ -154,6 +157,16 @@ ALL_STATES = (*STATES, *LATERAL_STATES, *PLACE_STATES)
 """What a flight carries: the symmetric states first."""
 ALL_INPUTS = (*INPUTS, *LATERAL_INPUTS)
 ALL_OUTPUTS = (*OUTPUTS, *LATERAL_OUTPUTS)
+
+
+def whole(vector: FloatArray, variables: Sequence[Variable]) -> FloatArray:
+    """A vector of the symmetric variables, with zeros for the others; one that is whole already is copied.
+
+    Args:
+        vector: The vector.
+        variables: ``ALL_STATES`` or ``ALL_INPUTS``.
+    """
+    return np.concatenate([vector, np.zeros(len(variables) - len(vector))])
 
 
 def of_role(variables: Sequence[Variable], *roles: str) -> tuple[int, ...]:

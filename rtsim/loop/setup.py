@@ -22,8 +22,8 @@ from rtsim.aircraft.variables import (
     FLAP_INPUTS,
     GROUND_INPUTS,
     STATE,
-    Variable,
     of_role,
+    whole,
 )
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
@@ -221,7 +221,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
     trim = start_trim(nonlinear, database, airspeed, nacelle, held)
-    x, u = (_widened(part, variables) for part, variables in zip(trim, (ALL_STATES, ALL_INPUTS), strict=True))
+    x, u = (whole(part, variables) for part, variables in zip(trim, (ALL_STATES, ALL_INPUTS), strict=True))
     ground = load_ground_tables(profile, own) if options.ground else no_ground()
     if options.ground:
         if not nonlinear and not meets_ground(loaded):
@@ -271,11 +271,6 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
-def _widened(symmetric: FloatArray, variables: Sequence[Variable]) -> FloatArray:
-    """A copy with zeros for what is not symmetric."""
-    return np.concatenate([symmetric, np.zeros(len(variables) - symmetric.size)])
-
-
 def new_scratch(tables: SimulationTables) -> Scratch:
     """Work space for a flight.
 
@@ -283,7 +278,7 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         tables: What flies.
     """
     states = len(ALL_STATES)
-    work = nonlinear_kernels.WORK_COUNT + 6 * states
+    work = nonlinear_kernels.WORK_COUNT + nonlinear_kernels.STEP_SIZE
     lpv = tables.plant.aircraft.target
     if hasattr(lpv, "cells"):
         work = max(work, interpreted(work_size)(lpv))

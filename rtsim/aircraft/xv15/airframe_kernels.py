@@ -1,4 +1,6 @@
-"""Wing, fuselage, pylons, spinners, jets and fins: force along body x and z [N], moment about the centre of gravity.
+"""Wing, fuselage, pylons, spinners, jets: force along body x and z [N], moment about the centre of gravity.
+
+What acts on one half of the aircraft is told for that half, as if it were the right one (see ``half_kernels``).
 
 Legend:
     wing: The tables.
@@ -10,9 +12,13 @@ import math
 
 from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.xv15.tables import BodyTables, Configuration, WingTables
+from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
 Load = tuple[float, float, float]
+"""Force along x and z [N], pitching moment [N m]."""
+HalfLoad = tuple[float, float, float, float, float, float]
+"""The same, then force along y [N], rolling and yawing moment [N m]."""
 
 
 @inner_kernel
@@ -59,6 +65,20 @@ def wind_to_body(lift: float, drag: float, u: float, w: float, arm: tuple[float,
 
 
 @inner_kernel
+def flap_bracket(nodes: FloatArray, flap: float) -> tuple[int, float]:
+    """Interval of the flap settings, and weight of its upper end.
+
+    Args:
+        nodes: Published settings, ascending [rad].
+        flap: Flap deflection [rad].
+    """
+    k = 0
+    while k < 2 and flap > nodes[k + 1]:
+        k += 1
+    return k, min(max((flap - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+
+
+@inner_kernel
 def wing_coefficients(
     wing: WingTables, alpha: float, mast_fraction: float, flap: float, mach: float
 ) -> tuple[float, float]:
@@ -70,11 +90,7 @@ def wing_coefficients(
         flap: Flap deflection [rad].
         mach: Flight Mach number.
     """
-    nodes = wing.flap_nodes
-    k = 0
-    while k < 2 and flap > nodes[k + 1]:
-        k += 1
-    part = min(max((flap - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+    k, part = flap_bracket(wing.flap_nodes, flap)
     folded = fold(alpha)
     lift = 0.0
     drag = 0.0
@@ -122,46 +138,56 @@ def wing_load(
     air: Configuration,
     flow: tuple[float, float, float],
     setting: tuple[float, float, float],
-    wake: tuple[float, float],
-    arms: tuple[tuple[float, float], tuple[float, float]],
+    arm: tuple[float, float],
 ) -> Load:
-    """Free-stream wing load plus the download of the part in the rotor wake.
+    """The wing outside the rotors' wakes.
 
     Args:
         air: Density and speed of sound.
         flow: u, w and pitch rate [m/s, rad/s].
         setting: Nacelle angle [rad], flap [rad], wing angle of attack [rad].
-        wake: Mean induced velocity and axial velocity of the rotors [m/s].
-        arms: Arms of the aerodynamic centre and of the download [m].
+        arm: Arm of the aerodynamic centre [m].
     """
     u, w, q = flow
     nacelle, flap, alpha = setting
-    arm = arms[0]
     u_local = u + q * arm[1]
     w_local = w - q * arm[0]
     speed_squared = u_local * u_local + w_local * w_local
     speed = math.sqrt(speed_squared)
     mast_fraction = min(max(1.0 - nacelle / (0.5 * math.pi), 0.0), 1.0)
     cl, cd = wing_coefficients(wing, alpha, mast_fraction, flap, speed / air.sound_speed)
-    share = immersed_share(wing, speed)
-    immersed = curve(wing.immersed_area, 0, nacelle) * share
+    immersed = curve(wing.immersed_area, 0, nacelle) * immersed_share(wing, speed)
     pressure = 0.5 * air.density * speed_squared
-    nodes = wing.flap_nodes
-    k = 0
-    while k < 2 and flap > nodes[k + 1]:
-        k += 1
-    part = min(max((flap - nodes[k]) / (nodes[k + 1] - nodes[k]), 0.0), 1.0)
+    k, part = flap_bracket(wing.flap_nodes, flap)
     cm = (1.0 - part) * curve(wing.moment, k, nacelle) + part * curve(wing.moment, k + 1, nacelle)
-    free_area = wing.area - immersed
-    free = pressure * free_area
-    x, z, moment = wind_to_body(free * cl, free * cd, u_local, w_local, arm, pressure * wing.area * wing.chord * cm)
+    free = pressure * (wing.area - immersed)
+    return wind_to_body(free * cl, free * cd, u_local, w_local, arm, pressure * wing.area * wing.chord * cm)
+
+
+@inner_kernel
+def download(
+    wing: WingTables,
+    air: Configuration,
+    speed: float,
+    setting: tuple[float, float],
+    wake: tuple[float, float],
+) -> tuple[float, float]:
+    """Force along x and z on the part of one half wing in its rotor's wake [N].
+
+    Args:
+        air: Density.
+        speed: Airspeed of the wing in the plane of symmetry [m/s].
+        setting: Nacelle angle, flap [rad].
+        wake: Mean induced velocity and axial velocity of the rotor [m/s].
+    """
+    nacelle, flap = setting
+    immersed = 0.5 * (curve(wing.immersed_area, 0, nacelle) * immersed_share(wing, speed))
+    k, part = flap_bracket(wing.flap_nodes, flap)
     wake_speed = wing.immersed_velocity_factor * wake[0] + wake[1]
     broadside = -0.5 * math.pi
     normal_drag = (1.0 - part) * curve(wing.drag, 4 + k, broadside) + part * curve(wing.drag, 5 + k, broadside)
-    download = 0.5 * air.density * wake_speed * abs(wake_speed) * immersed * normal_drag
-    x_wake = -download * math.cos(nacelle)
-    z_wake = download * math.sin(nacelle)
-    return x + x_wake, z + z_wake, moment + arms[1][1] * x_wake - arms[1][0] * z_wake
+    push = 0.5 * air.density * wake_speed * abs(wake_speed) * immersed * normal_drag
+    return -push * math.cos(nacelle), push * math.sin(nacelle)
 
 
 @inner_kernel
@@ -186,8 +212,20 @@ def fuselage_load(body: BodyTables, air: Configuration, flow: tuple[float, float
 
 
 @inner_kernel
+def force_at(force: tuple[float, float, float], place: tuple[float, float, float]) -> HalfLoad:
+    """A force at a place, with its moments about the centre of gravity.
+
+    Args:
+        force: Along body x, y, z [N].
+        place: From the centre of gravity [m].
+    """
+    x, y, z = force
+    return x, z, place[2] * x - place[0] * z, y, place[1] * z - place[2] * y, place[0] * y - place[1] * x
+
+
+@inner_kernel
 def drag_load(area: float, air: Configuration, flow: tuple[float, float], arm: tuple[float, float]) -> Load:
-    """What only resists: its drag along the flow.
+    """What only resists in the plane of symmetry: its drag along the flow.
 
     Args:
         area: Drag area [m^2].
@@ -205,44 +243,58 @@ def drag_load(area: float, air: Configuration, flow: tuple[float, float], arm: t
 def pylon_load(
     body: BodyTables,
     air: Configuration,
-    flow: tuple[float, float],
-    nacelle: float,
-    incidence: float,
+    flow: tuple[float, float, float],
+    setting: tuple[float, float, float],
     wake: float,
-    arm: tuple[float, float],
-) -> Load:
-    """Pylons in the whole flow about them: free stream and rotor wake (NASA CR-166536 table 4-XV).
+    place: tuple[float, float, float],
+) -> HalfLoad:
+    """One pylon in the whole flow about it in its own plane: free stream and rotor wake (NASA CR-166536 table 4-XV).
+
+    Flow across that plane meets its side as a flat plate (D_PLAT of the same source, whose dynamic pressure is taken
+    to be that of the sideward velocity alone: with the whole one the drag in conversion would double).
 
     Args:
         body: The tables.
         air: Density.
-        flow: Flow at the pivot without the wake, along body x and z [m/s].
-        incidence: Angle between mast and free stream [rad].
+        flow: Flow at the pivot without the wake, along body x, y and z [m/s].
+        setting: Nacelle angle [rad], angle between mast and free stream [rad], side area [m^2].
         wake: Velocity of the wake, down the mast [m/s].
-        arm: Arm of the pivot [m].
+        place: The pivot, from the centre of gravity [m].
     """
-    area = curve(body.pylon_area, 0, nacelle) * curve(body.pylon_incidence_factor, 0, incidence)
-    return drag_load(area, air, (flow[0] + wake * math.cos(nacelle), flow[1] - wake * math.sin(nacelle)), arm)
+    nacelle, incidence, side = setting
+    factor = curve(body.pylon_incidence_factor, 0, incidence)
+    area = 0.5 * (curve(body.pylon_area, 0, nacelle) * factor)
+    u, w = flow[0] + wake * math.cos(nacelle), flow[2] - wake * math.sin(nacelle)
+    pull = -0.5 * air.density * area * math.sqrt(u * u + w * w)
+    push = -0.5 * air.density * side * factor * flow[1] * abs(flow[1])
+    return force_at((pull * u, push, pull * w), place)
 
 
 @inner_kernel
 def spinner_load(
-    body: BodyTables, air: Configuration, hub: tuple[float, float], nacelle: float, arm: tuple[float, float]
-) -> Load:
-    """Spinners and hubs, in the flow at the hub.
+    body: BodyTables,
+    air: Configuration,
+    hub: tuple[float, float, float],
+    nacelle: float,
+    place: tuple[float, float, float],
+) -> HalfLoad:
+    """One spinner and hub, in the flow at the hub.
 
     Args:
         body: The tables.
         air: Density.
-        hub: Flow in the disc plane towards the nose, and along the mast with the induced velocity [m/s].
-        arm: Arm of the hub [m].
+        hub: Flow in the disc plane towards the nose and outboard, and along the mast with the induced velocity [m/s].
+        place: The hub, from the centre of gravity [m].
     """
-    across, along = hub
+    ahead, outboard, along = hub
+    across = math.sqrt(ahead * ahead + outboard * outboard)
     # Sine of the angle between mast and flow.
-    sine = abs(across) / max(math.sqrt(across * across + along * along), 1e-9)
-    area = body.spinner_area + body.spinner_incidence_area * sine**3
+    sine = across / max(math.sqrt(across * across + along * along), 1e-9)
+    area = 0.5 * (body.spinner_area + body.spinner_incidence_area * sine**3)
     s, c = math.sin(nacelle), math.cos(nacelle)
-    return drag_load(area, air, (across * s + along * c, across * c - along * s), arm)
+    u, w = ahead * s + along * c, ahead * c - along * s
+    pull = -0.5 * air.density * area * math.sqrt(u * u + w * w + outboard * outboard)
+    return force_at((pull * u, pull * outboard, pull * w), place)
 
 
 @inner_kernel

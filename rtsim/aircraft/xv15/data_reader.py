@@ -13,8 +13,8 @@ import numpy as np
 
 from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.profile import XV15_DATA
-from rtsim.aircraft.smooth_tables import smooth_curves, smooth_surface, stack_surfaces
-from rtsim.aircraft.table_kernels import Curves
+from rtsim.aircraft.smooth_tables import against_nacelle, smooth_curves, smooth_surface, stack_surfaces
+from rtsim.aircraft.xv15.lateral_reader import read_lateral
 from rtsim.aircraft.xv15.rotor_reader import read_rotor
 from rtsim.aircraft.xv15.tables import (
     AircraftTables,
@@ -33,7 +33,6 @@ from rtsim.units import FOOT, HORSEPOWER, INCH, KNOT, POUND, POUND_FORCE, SLUG, 
 Data = dict[str, Any]
 
 ALPHA_GRID = np.radians(np.arange(-90.0, 90.5, 0.5))
-NACELLE_GRID = np.radians(np.arange(0.0, 96.0, 1.0))
 
 
 def read_data() -> tuple[Data, Data]:
@@ -41,10 +40,9 @@ def read_data() -> tuple[Data, Data]:
     return shipped_toml(XV15_DATA, "xv15_inputs.toml"), shipped_toml(XV15_DATA, "model_choices.toml")
 
 
-def _against_nacelle(mast_deg: Sequence[float], rows: Sequence[Sequence[float]]) -> Curves:
-    """Curves printed against mast angle, turned round to run against nacelle angle [rad]."""
-    nacelle = [deg(90.0 - b) for b in reversed(mast_deg)]
-    return smooth_curves([nacelle] * len(rows), [list(reversed(row)) for row in rows], NACELLE_GRID)
+def read_lateral_data() -> Data:
+    """The sourced lateral inputs, as printed."""
+    return shipped_toml(XV15_DATA, "xv15_lateral.toml")
 
 
 def _extended(
@@ -104,12 +102,12 @@ def _wing(data: Data, choices: Data) -> WingTables:
         chord=wing["c_ref_ft"] * FOOT,
         lift=lift,
         drag=smooth_curves(alphas, drags, ALPHA_GRID),
-        moment=_against_nacelle(wing["Cm_betam_deg"], moments),
+        moment=against_nacelle(wing["Cm_betam_deg"], moments),
         flap_nodes=np.radians(data["controls"]["flap_settings_deg"]),
         # The law is printed in degrees with a polynomial in degrees; 57.3 turns it to degrees, we stay in radians.
         upwash=gain * np.array([x0, x1 * 180.0 / np.pi, x2 * (180.0 / np.pi) ** 2]),
         mach_gain=choices["wing"]["mach_lift_slope_gain"],
-        immersed_area=_against_nacelle(mast, [[immersed * max(s, 0.0) for s in share]]),
+        immersed_area=against_nacelle(mast, [[immersed * max(s, 0.0) for s in share]]),
         immersed_fade_speed=choices["wing"]["immersed_fade_speed_kt"] * KNOT,
         immersed_velocity_factor=interference["induced_velocity_factor_at_wing"],
         position=np.array([ac[0], ac[1]]) * INCH,
@@ -129,7 +127,7 @@ def _body(data: Data, choices: Data) -> BodyTables:
     return BodyTables(
         fuselage=smooth_curves([alpha] * 3, rows, ALPHA_GRID),
         position=np.array(data["geometry"]["fuselage_ref_SL_WL_in"]) * INCH,
-        pylon_area=_against_nacelle(
+        pylon_area=against_nacelle(
             interference["pylon_interf_betam_deg"], [[v * FOOT**2 for v in interference["pylon_interf_D_ft2"]]]
         ),
         pylon_incidence_factor=smooth_curves(
@@ -211,12 +209,12 @@ def _tail(data: Data, choices: Data) -> TailTables:
 def _controls(data: Data, choices: Data) -> ControlTables:
     controls, own, lag = data["controls"], choices["controls"], data["assumed_dynamics"]
     half_travel = controls["stick_neutral_in"]
-    lever = _against_nacelle(
+    lever = against_nacelle(
         own["lever_betam_deg"],
         [[deg(v) for v in own["theta75_low_deg"]], [deg(v) for v in own["theta75_high_deg"]]],
     )
     return ControlTables(
-        cyclic_per_stick=_against_nacelle(
+        cyclic_per_stick=against_nacelle(
             controls["betam_deg"], [[deg(v) * half_travel for v in controls["cyclic_deg_per_in"]]]
         ),
         cyclic_limit=deg(controls["cyclic_limit_deg"]),
@@ -252,10 +250,10 @@ def _mass(data: Data, choices: Data) -> MassTables:
     )
 
 
-def _change(data: Data, choices: Data, name: str, value: object) -> None:
-    """Put one value in the place of another, as named by tables and key."""
+def _change(sources: Sequence[Data], name: str, value: object) -> None:
+    """Put one value in the place of another, as named by tables and key; the first source that has it."""
     *tables, key = name.split(".")
-    for source in (choices, data):
+    for source in sources:
         table: Any = source
         for part in tables:
             table = table.get(part, {})
@@ -274,9 +272,9 @@ def load_tables(changes: Mapping[str, Any] | None = None) -> AircraftTables:
     Raises:
         InputError: There is no such entry.
     """
-    data, choices = read_data()
+    (data, choices), lateral = read_data(), read_lateral_data()
     for name, value in (changes or {}).items():
-        _change(data, choices, name, value)
+        _change((choices, data, lateral), name, value)
     rotor_speed = rpm(data["rotor"]["rpm_heli_conversion"])
     # The same function as Xv15.at, so that a trim there is an equilibrium here to the last digit.
     density, sound_speed = standard_atmosphere(0.0)
@@ -295,4 +293,5 @@ def load_tables(changes: Mapping[str, Any] | None = None) -> AircraftTables:
         tail=_tail(data, choices),
         controls=_controls(data, choices),
         mass=_mass(data, choices),
+        lateral=read_lateral(lateral, data, choices),
     )

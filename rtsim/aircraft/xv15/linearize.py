@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.variables import FLAP_INPUTS, INPUT, INPUTS, OUTPUTS, STATE, STATES
+from rtsim.aircraft.variables import (
+    ALL_INPUTS,
+    ALL_OUTPUTS,
+    ALL_STATES,
+    FLAP_INPUTS,
+    INPUT,
+    INPUTS,
+    OUTPUTS,
+    STATE,
+    STATES,
+    whole,
+)
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
@@ -41,9 +52,10 @@ NACELLE_STEP = 1e-4
 
 
 def _evaluate(tables: AircraftTables, x: FloatArray, u: FloatArray, nacelle: float) -> FloatArray:
-    xdot, y = np.zeros(x.size), np.zeros(len(OUTPUTS))
+    x, u = whole(x, ALL_STATES), whole(u, ALL_INPUTS)
+    xdot, y = np.zeros(x.size), np.zeros(len(ALL_OUTPUTS))
     kernels.outputs(tables, x, u, nacelle, y, xdot, np.zeros(kernels.WORK_COUNT))
-    return np.concatenate([xdot, y])
+    return np.concatenate([xdot[: len(STATES)], y[: len(OUTPUTS)]])
 
 
 def _flap_column(tables: AircraftTables, trim: TrimPoint, condition: Condition, interval: int) -> FloatArray:

@@ -12,8 +12,8 @@ import numpy as np
 
 from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.condition import SHIPPED, AircraftCondition
-from rtsim.aircraft.points import Condition, LinearModel, TrimPoint
-from rtsim.aircraft.variables import OUTPUTS, STATES
+from rtsim.aircraft.points import Condition, LateralModel, LinearModel, TrimPoint
+from rtsim.aircraft.variables import ALL_INPUTS, ALL_OUTPUTS, ALL_STATES, OUTPUTS, whole
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
@@ -28,7 +28,7 @@ class Xv15:
 
     tables: AircraftTables
     """Parameters of the kernels."""
-    _work: FloatArray = field(default_factory=lambda: np.zeros(kernels.WORK_COUNT + 6 * len(STATES)), repr=False)
+    _work: FloatArray = field(default_factory=lambda: np.zeros(kernels.WORK_COUNT + kernels.STEP_SIZE), repr=False)
 
     @staticmethod
     def load(changes: Mapping[str, Any] | None = None) -> Xv15:
@@ -83,24 +83,32 @@ class Xv15:
         """State derivative.
 
         Args:
-            x: State, shape (17,), order of ``signals.STATES``.
-            u: Inputs, shape (11,), order of ``signals.INPUTS``.
+            x: State, order of ``variables.ALL_STATES``; the symmetric ones (``STATES``) alone will do.
+            u: Inputs, order of ``variables.ALL_INPUTS``; the symmetric ones alone will do.
+
+        Returns:
+            The rates of the states given.
         """
-        xdot = np.zeros(len(STATES))
-        kernels.derivative(self.tables, x, u, nacelle_angle, xdot, self._work)
-        return xdot
+        xdot = np.zeros(len(ALL_STATES))
+        kernels.derivative(self.tables, whole(x, ALL_STATES), whole(u, ALL_INPUTS), nacelle_angle, xdot, self._work)
+        return xdot[: len(x)]
 
     def outputs(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> FloatArray:
-        """Outputs, order of ``signals.OUTPUTS``."""
-        y, xdot = np.zeros(len(OUTPUTS)), np.zeros(len(STATES))
-        kernels.outputs(self.tables, x, u, nacelle_angle, y, xdot, self._work)
-        return y
+        """Outputs, order of ``variables.ALL_OUTPUTS``; of symmetric states alone the symmetric ones."""
+        y, xdot = np.zeros(len(ALL_OUTPUTS)), np.zeros(len(ALL_STATES))
+        states, inputs = whole(x, ALL_STATES), whole(u, ALL_INPUTS)
+        kernels.outputs(self.tables, states, inputs, nacelle_angle, y, xdot, self._work)
+        return y if len(x) == len(ALL_STATES) else y[: len(OUTPUTS)]
 
     def component_loads(self, x: FloatArray, u: FloatArray, nacelle_angle: float) -> dict[str, FloatArray]:
-        """Force along body x and z [N] and moment about the centre of gravity [N m] of each component."""
+        """Loads of each component about the centre of gravity.
+
+        Returns:
+            Force along body x and z [N], pitching moment [N m], then force along y, rolling and yawing moment.
+        """
         self.derivative(x, u, nacelle_angle)
-        start = kernels.COMPONENT
-        return {name: self._work[start + 3 * i : start + 3 * i + 3].copy() for i, name in enumerate(kernels.COMPONENTS)}
+        loads = self._work[kernels.WORK.component :].copy()
+        return {name: loads[kernels.AXES * i :][: kernels.AXES] for i, name in enumerate(kernels.COMPONENTS)}
 
     def trim(self, condition: Condition, guess: TrimPoint | None = None) -> TrimPoint:
         """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.
@@ -122,6 +130,18 @@ class Xv15:
         from rtsim.aircraft.xv15.linearize import linearize_at
 
         return linearize_at(self.at(condition).tables, condition, trim, step_scale=step_scale)
+
+    def linearize_lateral(self, condition: Condition, trim: TrimPoint, *, step_scale: float = 1.0) -> LateralModel:
+        """Lateral Jacobians at a symmetric trim.
+
+        Args:
+            trim: The trim found there.
+            step_scale: Multiplies every step; a second value checks the Jacobians.
+        """
+        from rtsim.aircraft.xv15.lateral_linearize import linearize_lateral_at
+
+        tables = self.at(condition).tables
+        return linearize_lateral_at(tables, condition.nacelle_angle, trim.x, trim.u, step_scale=step_scale)
 
 
 @cache

@@ -1,13 +1,14 @@
 """Blade-element rotor with gimbal flapping, coning and three-state dynamic inflow.
 
-Axes: ``t`` along the mast (thrust), ``f`` in the disc plane towards the nose, azimuth 0 aft and
-counter-clockwise seen along -t (advancing blade at 90 deg). The second rotor is the mirror image:
-in symmetric flight its thrust, forward force and pitching moment are equal and the rest cancels.
+Axes: ``t`` along the mast (thrust), ``f`` in the disc plane towards the nose, ``o`` in the disc plane towards where the
+blade is at azimuth 90 deg (outboard, as the XV-15 turns), azimuth 0 aft and counter-clockwise seen along -t. The second
+rotor is the mirror image, reckoned in its own mirrored frame: there is no left-handed rotor here.
 
 Legend of the short names:
     b0, b1c, b1s   coning and gimbal flapping [rad]     *d, *dd  their rates
     l0, l1c, l1s   inflow over tip speed                om       rotor speed [rad/s]
-    vf, vt         hub velocity along f and t [m/s]     p        pitch rate of the mast, nose up [rad/s]
+    vf, vt, vo     hub velocity along f, t, o [m/s]     p        pitch rate of the mast, nose up, about o [rad/s]
+    wf, wt         rates of the mast about f and t [rad/s]
     ut, up         section velocity in the disc plane and down through it [m/s]
 Sources: Johnson, Helicopter Theory (1980), ch. 5 (flapping, sign of each term); Pitt and Peters 1981 (inflow);
 White and Blake 1979 (fore-aft gradient); gearing and data NASA CR-166536.
@@ -15,11 +16,12 @@ White and Blake 1979 (fore-aft gradient); gearing and data NASA CR-166536.
 Legend:
     rotor: The rotor.
     air: Density, speed of sound, rotor speed.
-    hub: vf, vt, p.
+    hub: vf, vt, p, vo, wf, wt.
     flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
     inflow: l0, l1c, l1s.
     pitch: Collective at 75 % radius, longitudinal cyclic [rad].
-    loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m].
+    loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m], force
+        along o [N].
 """
 
 from __future__ import annotations
@@ -34,12 +36,14 @@ from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel, kernel
 
 # Entries of the load vector written by rotor_loads.
-THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT = 0, 1, 2, 3, 4, 5
-LOAD_COUNT = 6
+THRUST, FORWARD_FORCE, TORQUE, CONING_MOMENT, COSINE_MOMENT, SINE_MOMENT, OUTBOARD_FORCE = 0, 1, 2, 3, 4, 5, 6
+LOAD_COUNT = 7
 # Rows of the scratch array of one blade position; LIFT and DRAG become the normal and the in-plane force.
 ALPHA, SPEED, UT, UP, LIFT, DRAG = 0, 1, 2, 3, 4, 5
 ANGLE_PART, MACH_PART, CELL, NODES = 6, 7, 8, 9
 FLOW_COUNT = NODES + 6
+
+Hub = tuple[float, float, float, float, float, float]
 
 
 @inner_kernel
@@ -159,7 +163,7 @@ def _section_forces(rotor: RotorTables, air: Configuration, flow: FloatArray) ->
 def rotor_loads(
     rotor: RotorTables,
     air: Configuration,
-    hub: tuple[float, float, float],
+    hub: Hub,
     flapping: tuple[float, float, float, float, float, float],
     inflow: tuple[float, float, float],
     pitch: tuple[float, float],
@@ -174,7 +178,7 @@ def rotor_loads(
 def rotor_loads_in(
     rotor: RotorTables,
     air: Configuration,
-    hub: tuple[float, float, float],
+    hub: Hub,
     flapping: tuple[float, float, float, float, float, float],
     inflow: tuple[float, float, float],
     pitch: tuple[float, float],
@@ -186,7 +190,7 @@ def rotor_loads_in(
     Args:
         flow: Scratch, shape (FLOW_COUNT, stations).
     """
-    vf, vt, p = hub
+    vf, vt, p, vo, wf, wt = hub
     b0, b0d, b1c, b1cd, b1s, b1sd = flapping
     l0, l1c, l1s = inflow
     om = air.rotor_speed
@@ -202,8 +206,8 @@ def rotor_loads_in(
         beta_rate = b0d + (b1cd + om * b1s) * c + (b1sd - om * b1c) * s
         root_pitch = pitch[0] + pitch[1] * s + rotor.pitch_flap * (beta - rotor.precone)
         gradient = (l1c * c + l1s * s) / rotor.radius
-        axial = (vt + tip * l0 + vf * beta * c, tip * gradient + beta_rate - p * c)
-        _section_flow(rotor, (vf * s, om), axial, root_pitch, flow)
+        axial = (vt + tip * l0 + vf * beta * c - vo * beta * s, tip * gradient + beta_rate - p * c - wf * s)
+        _section_flow(rotor, (vf * s + vo * c, om + wt), axial, root_pitch, flow)
         _section_tables(rotor, air, flow)
         _section_forces(rotor, air, flow)
         normal_sum = 0.0
@@ -217,11 +221,12 @@ def rotor_loads_in(
             moment_sum += flow[LIFT, i] * stations[i]
         loads[THRUST] += normal_sum
         loads[FORWARD_FORCE] += normal_sum * beta * c - drag_sum * s
+        loads[OUTBOARD_FORCE] -= normal_sum * beta * s + drag_sum * c
         loads[TORQUE] += torque_sum
         loads[CONING_MOMENT] += moment_sum
         loads[COSINE_MOMENT] += moment_sum * c
         loads[SINE_MOMENT] += moment_sum * s
-    for i in range(3):
+    for i in (THRUST, FORWARD_FORCE, TORQUE, OUTBOARD_FORCE):
         loads[i] *= rotor.blades / azimuths
     loads[CONING_MOMENT] /= azimuths
     loads[COSINE_MOMENT] *= 2.0 / azimuths
@@ -232,28 +237,29 @@ def rotor_loads_in(
 def flapping_accelerations(
     rotor: RotorTables,
     om: float,
-    mast: tuple[float, float],
+    mast: tuple[float, float, float, float],
     flapping: tuple[float, float, float, float, float, float],
     loads: FloatArray,
 ) -> tuple[float, float, float]:
     """Accelerations of coning and gimbal in the non-rotating frame [rad/s^2].
 
-    The mast pitching at rate p leaves the disc behind: + p_dot in the cosine and -2 om p in the sine equation.
+    The mast pitching at rate p leaves the disc behind: + p_dot in the cosine and -2 om p in the sine equation; turning
+    about f at rate wf it does the same a quarter turn further on.
 
     Args:
         om: Rotor speed [rad/s].
-        mast: Pitch rate of the mast, nacelle motion included [rad/s], and its rate [rad/s^2].
+        mast: Pitch rate of the mast, nacelle motion included [rad/s], and its rate [rad/s^2]; wf and its rate.
         loads: From ``rotor_loads``.
     """
     b0, _, b1c, b1cd, b1s, b1sd = flapping
-    p, p_dot = mast
+    p, p_dot, wf, wf_dot = mast
     inertia = rotor.blade_inertia
     blade_spring = rotor.hub_spring * 2.0 / rotor.blades
     b0dd = loads[CONING_MOMENT] / inertia - om * om * (
         b0 + (rotor.coning_frequency_squared - 1.0) * (b0 - rotor.precone)
     )
-    b1cdd = (loads[COSINE_MOMENT] - blade_spring * b1c) / inertia - 2.0 * om * b1sd + p_dot
-    b1sdd = (loads[SINE_MOMENT] - blade_spring * b1s) / inertia + 2.0 * om * b1cd - 2.0 * om * p
+    b1cdd = (loads[COSINE_MOMENT] - blade_spring * b1c) / inertia - 2.0 * om * b1sd + p_dot + 2.0 * om * wf
+    b1sdd = (loads[SINE_MOMENT] - blade_spring * b1s) / inertia + 2.0 * om * b1cd - 2.0 * om * p + wf_dot
     return b0dd, b1cdd, b1sdd
 
 
@@ -261,7 +267,7 @@ def flapping_accelerations(
 def inflow_rates(
     rotor: RotorTables,
     air: Configuration,
-    hub: tuple[float, float, float],
+    hub: Hub,
     inflow: tuple[float, float, float],
     loads: FloatArray,
 ) -> tuple[float, float, float]:
@@ -278,7 +284,7 @@ def inflow_rates(
 def inflow_rates_near_ground(
     rotor: RotorTables,
     air: Configuration,
-    hub: tuple[float, float, float],
+    hub: Hub,
     inflow: tuple[float, float, float],
     loads: FloatArray,
     nearness: float,
@@ -296,21 +302,29 @@ def inflow_rates_near_ground(
     force_scale = air.density * math.pi * rotor.radius**2 * tip * tip
     thrust_coefficient = loads[THRUST] / force_scale
     moment_scale = 0.5 * rotor.blades / (force_scale * rotor.radius)
-    mu = hub[0] / tip
+    mu_f, mu_o = hub[0] / tip, hub[3] / tip
+    mu_squared = mu_f * mu_f + mu_o * mu_o
     # Two rotors side by side act as one wing of twice the span: less induced velocity in forward flight.
-    surcharge = rotor.induced_factor * (1.0 + curve(rotor.side_by_side, 0, abs(mu)))
+    surcharge = rotor.induced_factor * (1.0 + curve(rotor.side_by_side, 0, abs(mu_f)))
     momentum = l0 / (surcharge * (1.0 - rotor.ground_relief * nearness))
     through = hub[1] / tip + momentum
-    total = max(math.sqrt(mu * mu + through * through), 0.01)
-    mass_flow = max((mu * mu + through * (through + momentum)) / total, 0.02)
-    sin_skew = mu / total
+    total = max(math.sqrt(mu_squared + through * through), 0.01)
+    mass_flow = max((mu_squared + through * (through + momentum)) / total, 0.02)
+    # Sine of the wake's skew along f and o.
+    skew_f, skew_o = mu_f / total, mu_o / total
     cos_skew = abs(through) / total
     l0_rate = om / rotor.apparent_mass * (thrust_coefficient - 2.0 * momentum * total)
     lateral_gain = 4.0 / ((1.0 + cos_skew) * mass_flow)
     # White and Blake's gradient grows with the skew alone and so with speed itself; near hover it is faded in.
-    onset = mu / max(rotor.skew_gradient_onset, 1e-9)
+    onset = math.sqrt(mu_squared) / max(rotor.skew_gradient_onset, 1e-9)
     gradient = rotor.skew_gradient * (1.0 - math.exp(-onset * onset))
-    cosine_target = gradient * sin_skew * l0 + lateral_gain * cos_skew * moment_scale * loads[COSINE_MOMENT]
-    sine_target = lateral_gain * moment_scale * loads[SINE_MOMENT]
+    # In the wind's own axes only the gain along the wind is less by the skew; turned back without angles, so that
+    # hover is an ordinary point.
+    gain = lateral_gain * moment_scale
+    cosine, sine = loads[COSINE_MOMENT], loads[SINE_MOMENT]
+    turned = gain * skew_o / (1.0 + cos_skew)
+    cosine_target = gradient * skew_f * l0 + lateral_gain * cos_skew * moment_scale * cosine
+    cosine_target += turned * (skew_o * cosine + skew_f * sine)
+    sine_target = gain * sine - gradient * skew_o * l0 + turned * (skew_f * cosine - skew_o * sine)
     bandwidth = om / (rotor.gradient_apparent_mass * lateral_gain)
     return l0_rate, bandwidth * (cosine_target - l1c), bandwidth * (sine_target - l1s)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rtsim.aircraft.table_kernels import Curves, Surfaces
+from rtsim.aircraft.xv15.lateral_tables import LateralTables
 from rtsim.arrays import FloatArray
 
 
@@ -222,3 +223,5 @@ class AircraftTables(NamedTuple):
     """Mixing and actuators."""
     mass: MassTables
     """Inertia and geometry."""
+    lateral: LateralTables
+    """What acts out of the plane of symmetry."""

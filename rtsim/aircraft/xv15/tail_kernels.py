@@ -6,6 +6,8 @@ import math
 
 from rtsim.aircraft.table_kernels import curve, surface
 from rtsim.aircraft.xv15.airframe_kernels import fold, wind_to_body
+from rtsim.aircraft.xv15.lateral_kernels import rounded_size
+from rtsim.aircraft.xv15.lateral_tables import SideslipTables
 from rtsim.aircraft.xv15.tables import Configuration, TailTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
@@ -44,6 +46,16 @@ def downwash_angle(tail: TailTables, alpha: float, nacelle: float, flap: float) 
 
 
 @inner_kernel
+def pressure_left(sideslip: float) -> float:
+    """Share of the dynamic pressure that sideslip leaves to tail and fins (K_betaHS and K_betaVS).
+
+    Args:
+        sideslip: Sideslip as it enters tables [rad].
+    """
+    return max(math.cos(sideslip), 0.5)
+
+
+@inner_kernel
 def tail_load(
     tail: TailTables,
     air: Configuration,
@@ -51,6 +63,8 @@ def tail_load(
     setting: tuple[float, float, float],
     induced: float,
     arm: tuple[float, float],
+    slip: SideslipTables,
+    sideslip: float,
 ) -> tuple[float, float, float]:
     """Force [N] and pitching moment about the centre of gravity [N m].
 
@@ -61,6 +75,8 @@ def tail_load(
         setting: Nacelle angle, flap, elevator [rad].
         induced: Mean induced velocity of the rotors [m/s].
         arm: Arm of the tail from the centre of gravity [m].
+        slip: What sideslip changes.
+        sideslip: Sideslip as it enters tables [rad].
     """
     u, w, q = flow
     nacelle, flap, elevator = setting
@@ -73,7 +89,8 @@ def tail_load(
     for a in range(2):
         weight = part if a == 1 else 1.0 - part
         if weight != 0.0 and k + a < 3:
-            wake += weight * surface(tail.rotor_wake, k + a, alpha, forward_speed)
+            met = curve(slip.tail_wake, k + a, abs(sideslip))
+            wake += weight * surface(tail.rotor_wake, k + a, alpha, forward_speed) * met
     k, part = _bracket(tail.downwash_nacelle, nacelle)
     ratio = (1.0 - part) * surface(tail.pressure_ratio, k, alpha, forward_speed) + part * surface(
         tail.pressure_ratio, k + 1, alpha, forward_speed
@@ -90,8 +107,11 @@ def tail_load(
     cl = surface(tail.lift, 0, folded, elevator)
     if abs(tail_alpha) > 0.5 * math.pi:
         cl = 0.0
+    cl += slip.tail_lift * rounded_size(sideslip, slip.rounding)
     cd = curve(tail.drag, 0, folded)
-    pressure = 0.5 * air.density * tail.pressure_factor * ratio * (u_tail * u_tail + w_tail * w_tail)
+    pressure = (
+        0.5 * air.density * tail.pressure_factor * ratio * pressure_left(sideslip) * (u_tail * u_tail + w_tail * w_tail)
+    )
     return wind_to_body(
         pressure * tail.area * cl, pressure * tail.area * cd, math.cos(tail_alpha), math.sin(tail_alpha), arm, 0.0
     )

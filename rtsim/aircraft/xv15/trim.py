@@ -13,7 +13,17 @@ from dataclasses import replace
 import numpy as np
 
 from rtsim.aircraft.points import Condition, TrimPoint
-from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, OUTPUTS, STATE, STATES
+from rtsim.aircraft.variables import (
+    ALL_INPUTS,
+    ALL_OUTPUTS,
+    ALL_STATES,
+    INPUT,
+    INPUTS,
+    OUTPUT,
+    OUTPUTS,
+    STATE,
+    STATES,
+)
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.aircraft.xv15.trim_kernels import (
@@ -109,9 +119,9 @@ def _unknowns(point: TrimPoint) -> FloatArray:
 
 def _point(tables: AircraftTables, condition: Condition, z: FloatArray) -> TrimPoint:
     """Trim point of a set of unknowns, saying which residual did not close."""
-    x, u, residuals = np.empty(len(STATES)), np.empty(len(INPUTS)), np.empty(UNKNOWNS)
+    x, u, residuals = np.empty(len(ALL_STATES)), np.empty(len(ALL_INPUTS)), np.empty(UNKNOWNS)
     trim_vectors(tables, _flight(condition), z, x, u)
-    xdot, y, work = np.zeros(len(STATES)), np.zeros(len(OUTPUTS)), np.zeros(kernels.WORK_COUNT)
+    xdot, y, work = np.zeros(x.size), np.zeros(len(ALL_OUTPUTS)), np.zeros(kernels.WORK_COUNT)
     kernels.outputs(tables, x, u, condition.nacelle_angle, y, xdot, work)
     trim_residual(tables, _flight(condition), z, residuals)
     sizes = np.where(np.isfinite(residuals), np.abs(residuals), np.inf)
@@ -123,7 +133,10 @@ def _point(tables: AircraftTables, condition: Condition, z: FloatArray) -> TrimP
     elif abs(u[INPUT.stick]) > 1.0:
         # The actuators stop: what closes on paper is not an equilibrium of the aircraft.
         unclosed = STATES[STATE.elevator].name
-    return TrimPoint(x=x, u=u, y=y, xdot=xdot, converged=unclosed == "", residual=residual, unclosed=unclosed)
+    states, inputs, outputs = (slice(len(variables)) for variables in (STATES, INPUTS, OUTPUTS))
+    return TrimPoint(
+        x[states], u[inputs], y[outputs], xdot[states], converged=unclosed == "", residual=residual, unclosed=unclosed
+    )
 
 
 def _solve(tables: AircraftTables, condition: Condition, z: FloatArray, iterations: int = 40) -> TrimPoint:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from rtsim.aircraft.table_kernels import curve
-from rtsim.aircraft.variables import INPUT, INPUTS, STATE, STATES
+from rtsim.aircraft.variables import ALL_INPUTS, ALL_STATES, INPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import WORK_COUNT, derivative
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
@@ -34,7 +34,7 @@ RESIDUAL_ROWS = (
 RESIDUAL_SCALE = (1.0, 1.0, 1.0, 1e-2, 1e-2, 1e-2, 1.0, 1.0, 1.0)
 STEPS = (1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6)
 """Steps of the central differences, one for each unknown."""
-_STATE_COUNT, _INPUT_COUNT = len(STATES), len(INPUTS)
+_STATE_COUNT, _INPUT_COUNT = len(ALL_STATES), len(ALL_INPUTS)
 
 Flight = tuple[float, float, float]
 """Horizontal airspeed [m/s], acceleration along it [m/s^2], nacelle angle [rad]."""

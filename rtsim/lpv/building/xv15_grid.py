@@ -39,7 +39,7 @@ CORNER_AIRSPEED, CORNER_NACELLE = 0.1, 1e-3
 
 MODEL_DATA = files(rtsim.aircraft.xv15) / "data"
 """Folder of the nonlinear model's data."""
-MODEL_FILES = ("model_choices.toml", "rotor_sections.toml", "xv15_inputs.toml")
+MODEL_FILES = ("model_choices.toml", "rotor_sections.toml", "xv15_inputs.toml", "xv15_lateral.toml")
 """Data of the nonlinear model, in the order in which they are hashed."""
 SAMPLE = 29
 """One trim in so many is checked by ``still_trims``."""
