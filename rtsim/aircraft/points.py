@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rtsim.arrays import FloatArray
+from rtsim.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +26,26 @@ class Condition:
     """Mass [kg]; None: the aircraft's own."""
     pressure_altitude: float | None = None
     """Height in the standard atmosphere [m]; None: the aircraft's own air."""
+    load_factor: float = 1.0
+    """Weight that the aircraft carries in straight flight over its own: the air loads of a turn, without its rates."""
+    bank: float = 0.0
+    """Bank angle of a coordinated level turn, right positive [rad]."""
+    sideslip: float = 0.0
+    """Sideslip in straight flight, wind from the right positive [rad]; ``airspeed`` is then the whole horizontal one."""
+    lateral_airspeed: float = 0.0
+    """Horizontal airspeed to the right, across the heading [m/s]."""
+
+    def __post_init__(self) -> None:
+        """Refuse what excludes itself."""
+        if sum(value != 0.0 for value in (self.bank, self.sideslip, self.lateral_airspeed)) > 1:
+            raise InputError(
+                "more than one of them", key="bank, sideslip, lateral_airspeed", mend="ask for one of them"
+            )
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether nothing moves out of the plane of symmetry."""
+        return self.bank == 0.0 and self.sideslip == 0.0 and self.lateral_airspeed == 0.0
 
 
 @dataclass(frozen=True, slots=True)

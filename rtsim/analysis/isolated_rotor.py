@@ -129,7 +129,14 @@ class IsolatedRotor:
         speed = condition.tip_mach * self.air.sound_speed
         air = self.air._replace(rotor_speed=speed / rotor.radius)
         airspeed = condition.advance_ratio * speed
-        hub = (airspeed * math.cos(condition.shaft_angle), -airspeed * math.sin(condition.shaft_angle), 0.0)
+        hub = (
+            airspeed * math.cos(condition.shaft_angle),
+            -airspeed * math.sin(condition.shaft_angle),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
         loads = np.zeros(kernels.LOAD_COUNT)
 
         def residual(z: FloatArray) -> list[float]:
@@ -137,7 +144,7 @@ class IsolatedRotor:
             flapping = (coning, 0.0, 0.0, 0.0, side, 0.0)
             flow = (inflow[0], inflow[1], inflow[2])
             kernels.rotor_loads(rotor, air, hub, flapping, flow, (collective, cyclic), loads)
-            flaps = kernels.flapping_accelerations(rotor, air.rotor_speed, (0.0, 0.0), flapping, loads)
+            flaps = kernels.flapping_accelerations(rotor, air.rotor_speed, (0.0, 0.0, 0.0, 0.0), flapping, loads)
             flows = kernels.inflow_rates(rotor, air, hub, flow, loads)
             # Flapping accelerations per rotor speed squared, inflow rates per rotor speed: all of order one.
             return [*(a / air.rotor_speed**2 for a in flaps), *(rate / air.rotor_speed for rate in flows)]

@@ -92,8 +92,8 @@ class FinTables(NamedTuple):
     mach_gain: float
     """Relative increase of the slope at Mach 0.4."""
     sidewash: Surfaces
-    """1 less the sidewash slope against angle of attack and size of the sideslip: rows mast 0, 30, 60, 90 deg, each F0 F20
-    F40 F75."""
+    """1 less the sidewash slope against angle of attack and size of the sideslip: rows mast 0, 30, 60, 90 deg, each F0
+    F20 F40 F75."""
     sidewash_nacelle: FloatArray
     """Nacelle angles of these rows [rad], descending."""
     rotor_sidewash: Surfaces

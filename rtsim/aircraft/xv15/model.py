@@ -111,13 +111,19 @@ class Xv15:
         return {name: loads[kernels.AXES * i :][: kernels.AXES] for i, name in enumerate(kernels.COMPONENTS)}
 
     def trim(self, condition: Condition, guess: TrimPoint | None = None) -> TrimPoint:
-        """Find the level-flight trim; where none was found ``converged`` is False and ``unclosed`` names the residual.
+        """Find the trim; where none was found ``converged`` is False and ``unclosed`` names the residual or control.
 
         Args:
-            guess: A neighbouring trim to start from (continuation); None: the unstalled trim is searched for.
+            guess: A neighbouring symmetric trim to start from (continuation); None: the unstalled trim is searched for.
+
+        Returns:
+            The trim: of a symmetric condition the symmetric variables, of another all of them.
         """
+        from rtsim.aircraft.xv15.steady import solve_steady
         from rtsim.aircraft.xv15.trim import solve_trim
 
+        if not condition.symmetric:
+            return solve_steady(self.at(condition).tables, condition)
         return solve_trim(self.at(condition).tables, condition, guess)
 
     def linearize(self, condition: Condition, trim: TrimPoint, *, step_scale: float = 1.0) -> LinearModel:

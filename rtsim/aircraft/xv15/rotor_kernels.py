@@ -20,8 +20,8 @@ Legend:
     flapping: b0, b0d, b1c, b1cd, b1s, b1sd.
     inflow: l0, l1c, l1s.
     pitch: Collective at 75 % radius, longitudinal cyclic [rad].
-    loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m], force
-        along o [N].
+    loads: Written: thrust [N], force along f [N], torque [N m], mean, cosine and sine flap moment of a blade [N m],
+        force along o [N].
 """
 
 from __future__ import annotations

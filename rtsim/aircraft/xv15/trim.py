@@ -57,7 +57,9 @@ _MOST_STEPS = 40
 
 
 def _flight(condition: Condition) -> Flight:
-    return float(condition.airspeed), float(condition.acceleration), float(condition.nacelle_angle)
+    values = (condition.airspeed, condition.acceleration, condition.nacelle_angle, condition.load_factor)
+    airspeed, acceleration, nacelle, load_factor = (float(value) for value in values)
+    return airspeed, acceleration, nacelle, load_factor
 
 
 def _newton(tables: AircraftTables, condition: Condition, z: FloatArray, iterations: int) -> FloatArray:

@@ -17,6 +17,7 @@ from rtsim.aircraft.xv15.dynamics_kernels import WORK_COUNT, derivative
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import kernel
+from rtsim.units import GRAVITY
 
 UNKNOWNS = 9
 RESIDUAL_ROWS = (
@@ -36,8 +37,8 @@ STEPS = (1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-6, 1e-6, 1e-6)
 """Steps of the central differences, one for each unknown."""
 _STATE_COUNT, _INPUT_COUNT = len(ALL_STATES), len(ALL_INPUTS)
 
-Flight = tuple[float, float, float]
-"""Horizontal airspeed [m/s], acceleration along it [m/s^2], nacelle angle [rad]."""
+Flight = tuple[float, float, float, float]
+"""Horizontal airspeed [m/s], acceleration along it [m/s^2], nacelle angle [rad], load factor."""
 
 
 @kernel
@@ -45,12 +46,12 @@ def trim_vectors(tables: AircraftTables, flight: Flight, z: FloatArray, x: Float
     """State and inputs of a set of unknowns; the actuators stand where stick and lever ask them to, stops ignored.
 
     Args:
-        flight: Airspeed, acceleration, nacelle angle.
+        flight: Airspeed, acceleration, nacelle angle, load factor.
         z: Unknowns.
         x: Written: state.
         u: Written: inputs.
     """
-    airspeed, _, nacelle = flight
+    airspeed, _, nacelle, _ = flight
     controls = tables.controls
     low = curve(controls.collective_range, 0, nacelle)
     high = curve(controls.collective_range, 1, nacelle)
@@ -73,15 +74,16 @@ def trim_residual(tables: AircraftTables, flight: Flight, z: FloatArray, residua
     """Scaled residuals of a set of unknowns.
 
     Args:
-        flight: Airspeed, acceleration, nacelle angle.
+        flight: Airspeed, acceleration, nacelle angle, load factor.
         z: Unknowns.
         residual: Written: residuals.
     """
     x, u, xdot, work = np.empty(_STATE_COUNT), np.empty(_INPUT_COUNT), np.empty(_STATE_COUNT), np.empty(WORK_COUNT)
     trim_vectors(tables, flight, z, x, u)
     derivative(tables, x, u, flight[2], xdot, work)
-    xdot[STATE.u] -= flight[1] * math.cos(z[0])
-    xdot[STATE.w] -= flight[1] * math.sin(z[0])
+    heavier = GRAVITY * (flight[3] - 1.0)
+    xdot[STATE.u] -= flight[1] * math.cos(z[0]) + heavier * math.sin(z[0])
+    xdot[STATE.w] -= flight[1] * math.sin(z[0]) - heavier * math.cos(z[0])
     for i in range(UNKNOWNS):
         residual[i] = RESIDUAL_SCALE[i] * xdot[RESIDUAL_ROWS[i]]
 
@@ -91,7 +93,7 @@ def trim_jacobian(tables: AircraftTables, flight: Flight, z: FloatArray, jacobia
     """Jacobian of the residuals by central differences.
 
     Args:
-        flight: Airspeed, acceleration, nacelle angle.
+        flight: Airspeed, acceleration, nacelle angle, load factor.
         z: Unknowns.
         jacobian: Written: derivative of residual (row) with respect to unknown (column).
     """
