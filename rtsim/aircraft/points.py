@@ -31,7 +31,7 @@ class Condition:
     bank: float = 0.0
     """Bank angle of a coordinated level turn, right positive [rad]."""
     sideslip: float = 0.0
-    """Sideslip in straight flight, wind from the right positive [rad]; ``airspeed`` is then the whole horizontal one."""
+    """Sideslip in straight flight, wind from the right positive [rad]; ``airspeed`` is then the whole one."""
     lateral_airspeed: float = 0.0
     """Horizontal airspeed to the right, across the heading [m/s]."""
 

@@ -9,8 +9,8 @@ import numpy as np
 from rtsim.kernels.packed import Packed
 from rtsim.kernels.parts import address_of, entry_point
 from rtsim.loop import part_kernels as parts
-from rtsim.loop import plant_kernels as plants
 from rtsim.loop.data import PART, Flight
+from rtsim.loop.plant_kernels import PLANT_PARTS
 from rtsim.protection.law_data import LAW_MONITOR
 
 _Key = tuple[str, tuple[Any, ...]]
@@ -42,11 +42,12 @@ def load_part(flight: Flight, name: str, *, nonlinear: bool) -> None:
         nonlinear: The nonlinear aircraft flies.
     """
     scratch, state, aircraft = flight.scratch, flight.state, flight.tables.plant.aircraft.target
+    kernel: Any
     if name == "outputs":
-        kernel: Any = plants.outputs_of_nonlinear if nonlinear else plants.outputs_of_lpv
+        kernel = PLANT_PARTS[type(aircraft._tuple)][0]
         arguments: tuple[Any, ...] = (aircraft, state.x, state.u, 0.0, scratch.y, scratch.xdot, scratch.work)
     elif name == "step":
-        kernel = plants.step_of_nonlinear if nonlinear else plants.step_of_lpv
+        kernel = PLANT_PARTS[type(aircraft._tuple)][1]
         arguments = (aircraft, state.x, state.u, scratch.path, 0.0, scratch.work)
     elif name == "decide":
         # The monitor flies with most flights: it is compiled without what the other laws need.

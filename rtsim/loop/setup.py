@@ -64,6 +64,9 @@ from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
 from rtsim.lpv.flown import flown_database, meets_ground, moves_flaps, turns_rotors
 from rtsim.lpv.lpv_kernels import work_size
+from rtsim.lpv.schedule_kernels import LpvTables
+from rtsim.lpv.sideways_kernels import sideways_work_size
+from rtsim.lpv.sideways_tables import SidewaysTables, prepare_sideways
 from rtsim.lpv.tables import Form, prepare_tables, scheduling_speed
 from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
@@ -235,7 +238,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         dt=dt,
         wind=float(options.wind),
         plant=PlantTables(
-            aircraft=Address(own if nonlinear else prepare_tables(database, PLANT_FORMS[options.plant])),
+            aircraft=Address(own if nonlinear else _lpv_tables(database, options.plant)),
             configuration=own.configuration,
             controls=control_tables(profile),
             alpha_speed=scheduling_speed(database),
@@ -271,6 +274,14 @@ def build_parts(setup: FlightSetup) -> Parts:
     )
 
 
+def _lpv_tables(database: Database, plant: PlantName) -> LpvTables | SidewaysTables:
+    """The LPV aircraft: in six degrees of freedom where the database knows them and the form can."""
+    form = PLANT_FORMS[plant]
+    if form == "layered" and database.lateral is not None:
+        return prepare_sideways(database)
+    return prepare_tables(database, form)
+
+
 def new_scratch(tables: SimulationTables) -> Scratch:
     """Work space for a flight.
 
@@ -279,9 +290,11 @@ def new_scratch(tables: SimulationTables) -> Scratch:
     """
     states = len(ALL_STATES)
     work = nonlinear_kernels.WORK_COUNT + nonlinear_kernels.STEP_SIZE
-    lpv = tables.plant.aircraft.target
-    if hasattr(lpv, "cells"):
-        work = max(work, interpreted(work_size)(lpv))
+    aircraft = tables.plant.aircraft.target
+    if hasattr(aircraft, "symmetric"):
+        work = max(work, interpreted(sideways_work_size)(aircraft))
+    elif hasattr(aircraft, "cells"):
+        work = max(work, interpreted(work_size)(aircraft))
     return Scratch(
         work=np.zeros(work),
         y=np.zeros(len(ALL_OUTPUTS)),

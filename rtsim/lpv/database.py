@@ -27,8 +27,8 @@ GRIDDED: Final = ("x_ref", "u_ref", "y_ref", "xdot_ref", "A", "B", "C", "D", "df
 
 
 @dataclass(frozen=True, slots=True)
-class PilotArrays:
-    """The gains of one pilot design, stored with the database they were designed for."""
+class StoredArrays:
+    """Named arrays that a database carries: the gains of a pilot design made for it, its lateral half."""
 
     arrays: Mapping[str, FloatArray]
     """Named arrays."""
@@ -78,8 +78,10 @@ class Database:
     """The ny outputs."""
     attributes: Mapping[str, str | float | int] = field(default_factory=dict)
     """Title, condition (weight, density), versions, hash of the aircraft data."""
-    pilot: Mapping[str, PilotArrays] = field(default_factory=dict)
+    pilot: Mapping[str, StoredArrays] = field(default_factory=dict)
     """Pilot gains by name of the design."""
+    lateral: StoredArrays | None = None
+    """The motion out of the plane of symmetry (``rtsim.lpv.lateral.LateralData``); None: it stays in that plane."""
     profile: AircraftProfile = field(default_factory=borrowed_profile, repr=False)
     """What flies besides: nacelles, corridor, limits, systems, controls, weights; the XV-15's unless given."""
     _hash: str = field(default="", init=False, repr=False, compare=False)
@@ -112,7 +114,8 @@ class Database:
     def freeze(self) -> None:
         """Make every array read-only, as after loading: a copy from another process has lost that."""
         arrays = [getattr(self, item.name) for item in fields(self)]
-        arrays += [array for pilot in self.pilot.values() for array in pilot.arrays.values()]
+        groups = [*self.pilot.values(), *([] if self.lateral is None else [self.lateral])]
+        arrays += [array for group in groups for array in group.arrays.values()]
         for array in arrays:
             if isinstance(array, np.ndarray):
                 array.setflags(write=False)
@@ -160,9 +163,12 @@ class Database:
         for design in sorted(self.pilot):
             for name in sorted(self.pilot[design].arrays):
                 _update(digest, f"pilot/{design}/{name}", self.pilot[design].arrays[name])
+        if self.lateral is not None:
+            for name in sorted(self.lateral.arrays):
+                _update(digest, f"lateral/{name}", self.lateral.arrays[name])
         return digest.hexdigest()
 
-    def with_pilot(self, design: str, pilot: PilotArrays) -> Database:
+    def with_pilot(self, design: str, pilot: StoredArrays) -> Database:
         """Give a copy that carries the gains of one more pilot design.
 
         Args:

@@ -73,6 +73,34 @@ def _apply(
 
     Views come from the caller: making them here costs as much as the sums.
     """
+    add_deviations(tables, x, u, xdot, reference, columns, deviation, total, of_inputs)
+    if tables.roles.form != FORM_PLAIN:
+        _add_rigid_body(tables.roles, x, xdot)
+
+
+@inner_kernel
+def add_deviations(
+    tables: LpvTables,
+    x: FloatArray,
+    u: FloatArray,
+    xdot: FloatArray,
+    reference: FloatArray,
+    columns: FloatArray,
+    deviation: FloatArray,
+    total: FloatArray,
+    of_inputs: int,
+) -> None:
+    """Evaluate the linear part of the blended model at (x, u) with the first so many inputs.
+
+    Args:
+        u: Total input.
+        xdot: Receives the state derivative (nx,).
+        reference: Blended trim state and input.
+        columns: The blended columns: derivative at the trim, then those of A and B.
+        deviation: Scratch.
+        total: Scratch of as many values as there are rows.
+        of_inputs: How many active columns of B are used.
+    """
     roles = tables.roles
     states = roles.states
     rows = roles.rows
@@ -96,8 +124,6 @@ def _apply(
         xdot[k] = 0.0
     for k in range(tables.rows.shape[0]):
         xdot[tables.rows[k]] = total[k]
-    if roles.form != FORM_PLAIN:
-        _add_rigid_body(roles, x, xdot)
 
 
 @inner_kernel
@@ -116,7 +142,7 @@ def _add_rigid_body(roles: LpvRoles, x: FloatArray, xdot: FloatArray) -> None:
 
 
 @inner_kernel
-def _acting(tables: LpvTables, u: FloatArray) -> tuple[int, int]:
+def acting_inputs(tables: LpvTables, u: FloatArray) -> tuple[int, int]:
     """How many active columns of B are needed, and the length of a cell up to the last of them."""
     of_inputs = tables.roles.input_columns
     block = tables.cells.shape[3]
@@ -141,7 +167,7 @@ def lpv_derivative(
         work: Scratch of ``work_size(tables)`` values.
     """
     inputs_end = WORK.size + tables.roles.states + tables.roles.inputs
-    of_inputs, block = _acting(tables, u)
+    of_inputs, block = acting_inputs(tables, u)
     sums, scratch = rows_at(tables), scratch_at(tables)
     i, j = locate(tables, x, u, nacelle_angle, work)
     blend(tables.cells, i, j, block, work, work[WORK.size : WORK.size + block])
@@ -223,7 +249,7 @@ def lpv_step(
     refresh = roles.refresh
     rate = roles.nacelle_rate
     acceleration = roles.nacelle_acceleration
-    of_inputs, block = _acting(tables, u)
+    of_inputs, block = acting_inputs(tables, u)
     scratch = scratch_at(tables)
     model = work[WORK.size : WORK.size + block]
     reference = work[WORK.size : WORK.size + states + inputs]

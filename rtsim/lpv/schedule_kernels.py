@@ -40,13 +40,20 @@ FLAG_NACELLE = 4
 FLAG_NO_TRIM = 8
 """Bit of the flags: a neighbouring grid point has no trim and was filled from the nearest airspeed that has one."""
 
+FLAG_SIDEWARD = 16
+"""Bit of the flags: sideward velocity beyond the trims in sideslip (their end is the pedal's); the last is used."""
+FLAG_LOAD_FACTOR = 32
+"""Bit of the flags: a turn beyond the loaded trims; the last is used."""
+FLAG_BANK = 64
+"""Bit of the flags: bank beyond 45 deg, further than the aircraft was compared with the nonlinear one."""
+
 GAP_NONE = math.radians(1.0)
 """Layers whose angles of attack differ by less than this are not blended [rad]."""
 GAP_FULL = math.radians(2.0)
 """From this difference on they are blended in full; between the two the blend fades in [rad]."""
 
-MAX_LAYERS = 8
-"""Layers a database can have."""
+MAX_LAYERS = 12
+"""Layers a database can have, loaded trims included."""
 WORK = Places(
     "flags",
     "alpha",
@@ -225,9 +232,24 @@ def locate(
     pitch = x[roles.pitch]
     sine = math.sin(pitch)
     cosine = math.cos(pitch)
-    airspeed = u * cosine + w * sine
-    flags = int(work[WORK.flags])
+    i, j = weigh_corners(tables, u * cosine + w * sine, nacelle_angle, work)
+    alpha = scheduling_alpha(u, w, sine, cosine, tables.alpha_speed)
+    share_layers(tables, i, j, alpha, work)
+    return i, j
 
+
+@inner_kernel
+def weigh_corners(tables: LpvTables, airspeed: float, nacelle_angle: float, work: FloatArray) -> tuple[int, int]:
+    """Find the cell of an airspeed and a nacelle angle: corner weights and flags into ``work``.
+
+    Args:
+        airspeed: Forward airspeed [m/s].
+        work: Scratch of ``work_size(tables)`` values.
+
+    Returns:
+        Numbers of the airspeed and nacelle intervals.
+    """
+    flags = int(work[WORK.flags])
     last_v = tables.airspeed.shape[0] - 1
     last_n = tables.nacelle.shape[0] - 1
     i = cell_below(tables.airspeed, airspeed)
@@ -260,15 +282,26 @@ def locate(
     if covered < 1.0 - 1e-9:
         flags |= FLAG_NO_TRIM
     work[WORK.flags] = flags
+    return i, j
 
+
+@inner_kernel
+def share_layers(tables: LpvTables, i: int, j: int, alpha: float, work: FloatArray) -> None:
+    """Share the model out between the layers by angle of attack, into ``work``; loaded trims get nothing.
+
+    Args:
+        i: Number of the airspeed interval.
+        j: Number of the nacelle interval.
+        alpha: Angle of attack as used for scheduling [rad].
+        work: Holds the corners' weights.
+    """
     layers = tables.alpha.shape[2]
-    level = roles.level
-    for layer in range(layers):
+    level = tables.roles.level
+    for layer in range(tables.cells.shape[2]):
         work[WORK.layer_share + layer] = 0.0
     if layers == 1:
         work[WORK.layer_share] = 1.0
-        return i, j
-    alpha = scheduling_alpha(u, w, sine, cosine, tables.alpha_speed)
+        return
     work[WORK.alpha] = alpha
     # Walk outwards from the level layer. `gone` is the share that has left the layer before; the decelerating side
     # gets its part of what the accelerating side left, so that the shares always add up to one.
@@ -291,7 +324,6 @@ def locate(
         if layer != level:
             work[WORK.layer_share + layer] = gone
     work[WORK.layer_share + level] = rest
-    return i, j
 
 
 @inner_kernel
@@ -316,9 +348,27 @@ def blend(cells: FloatArray, i: int, j: int, count: int, work: FloatArray, targe
         work: Holds the weights that ``locate`` found.
         target: Receives the entries.
     """
+    blend_by(cells, i, j, count, work, work[WORK.layer_share :], target)
+
+
+@inner_kernel
+def blend_by(
+    cells: FloatArray, i: int, j: int, count: int, work: FloatArray, shares: FloatArray, target: FloatArray
+) -> None:
+    """Interpolate with other shares of the layers than ``locate`` found.
+
+    Args:
+        cells: Cells (V, N, L, block).
+        i: Number of the airspeed interval.
+        j: Number of the nacelle interval.
+        count: How many entries.
+        work: Holds the corners' weights.
+        shares: Share of each layer.
+        target: Receives the entries.
+    """
     fresh = True
     for layer in range(cells.shape[2]):
-        share = work[WORK.layer_share + layer]
+        share = shares[layer]
         if share == 0.0:
             continue
         w0 = share * work[WORK.corner]

@@ -22,6 +22,7 @@ from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
 from rtsim.lpv import schedule_kernels as kernels
 from rtsim.lpv.database import Database
+from rtsim.lpv.lateral import LateralData
 from rtsim.lpv.schedule_kernels import LpvRoles, LpvTables
 from rtsim.units import GRAVITY
 
@@ -71,8 +72,16 @@ def _prepare(database: Database, form: Form, refresh: Refresh) -> LpvTables:
     number = FORMS[form]
     level = database.level_layer
     layers = slice(None) if form == "layered" else slice(level, level + 1)
-    x_ref, u_ref = database.x_ref[layers], database.u_ref[layers]
-    A, B, xdot_ref = database.A[layers].copy(), database.B[layers].copy(), database.xdot_ref[layers].copy()
+    loads = LateralData.of(database) if form == "layered" and database.lateral is not None else None
+
+    def stacked(name: str) -> FloatArray:
+        """The layers of an array, those of the loaded trims last."""
+        array: FloatArray = getattr(database, name)[layers]
+        return array.copy() if loads is None else np.concatenate([array, getattr(loads, f"loaded_{name}")])
+
+    x_ref, u_ref, y_ref, A, B, C, D, xdot_ref = (
+        stacked(name) for name in ("x_ref", "u_ref", "y_ref", "A", "B", "C", "D", "xdot_ref")
+    )
     if form != "plain":
         _subtract_rigid_body(database, x_ref, A, xdot_ref)
     altitude = position(database.states, "altitude")
@@ -80,7 +89,7 @@ def _prepare(database: Database, form: Form, refresh: Refresh) -> LpvTables:
         # The altitude has no trim value: the air is the same at every height and the ground is far.
         A[..., altitude] = 0.0
 
-    rows, state_columns, input_columns = _active(A, B, xdot_ref)
+    rows, state_columns, input_columns = active(A, B, xdot_ref)
     roles = _roles(
         database,
         number,
@@ -93,26 +102,23 @@ def _prepare(database: Database, form: Form, refresh: Refresh) -> LpvTables:
         [
             x_ref,
             u_ref,
-            _columns(xdot_ref[..., rows, None], padded),
-            _columns(A[..., rows, :][..., state_columns], padded),
-            _columns(B[..., rows, :][..., input_columns], padded),
+            columns_of(xdot_ref[..., rows, None], padded),
+            columns_of(A[..., rows, :][..., state_columns], padded),
+            columns_of(B[..., rows, :][..., input_columns], padded),
         ],
         axis=-1,
     )
     output_cells = np.concatenate(
-        [
-            _columns(matrix, roles.output_rows)
-            for matrix in (database.y_ref[layers][..., None], database.C[layers], database.D[layers])
-        ],
+        [columns_of(matrix, roles.output_rows) for matrix in (y_ref[..., None], C, D)],
         axis=-1,
     )
     return LpvTables(
         airspeed=database.airspeed,
         nacelle=database.nacelle,
-        alpha=_layers_last(scheduling_alpha(database, x_ref)),
+        alpha=layers_last(scheduling_alpha(database, database.x_ref[layers])),
         valid=np.ascontiguousarray(database.valid[level], dtype=np.float64),
-        cells=_layers_last(cells),
-        output_cells=_layers_last(output_cells),
+        cells=layers_last(cells),
+        output_cells=layers_last(output_cells),
         rows=rows,
         state_columns=state_columns,
         input_columns=input_columns,
@@ -126,20 +132,25 @@ def scheduling_speed(database: Database) -> float:
     return database.profile.dimensions.number("scheduling_speed_m_s", low=0.1, high=100.0)
 
 
-def scheduling_alpha(database: Database, x: FloatArray) -> FloatArray:
+def scheduling_alpha(
+    database: Database, x: FloatArray, *, bank: FloatArray | float = 0.0, v: FloatArray | float = 0.0
+) -> FloatArray:
     """Angle of attack as used for scheduling, see ``schedule_kernels.scheduling_alpha``.
 
     Args:
         database: Says where u, w and pitch stand.
         x: States (..., nx).
+        bank: Bank angle (...) [rad].
+        v: Velocity along body y (...) [m/s].
 
     Returns:
         The angle (...) [rad].
     """
     u, w, pitch = (x[..., required_position(database.states, name, "scheduling")] for name in SCHEDULING_STATES)
     sine, cosine = np.sin(pitch), np.cos(pitch)
-    headwind = scheduling_speed(database) + np.maximum(0.0, -(u * cosine + w * sine))
-    return np.asarray(np.arctan2(w + headwind * sine, u + headwind * cosine))
+    ahead = u * cosine + (v * np.sin(bank) + w * np.cos(bank)) * sine
+    headwind = scheduling_speed(database) + np.maximum(0.0, -ahead)
+    return np.asarray(np.arctan2(w + headwind * sine * np.cos(bank), u + headwind * cosine))
 
 
 def _roles(
@@ -165,8 +176,8 @@ def _roles(
         "states": len(database.states),
         "inputs": len(database.inputs),
         "outputs": len(database.outputs),
-        "rows": _padded(rows.size),
-        "output_rows": _padded(len(database.outputs)),
+        "rows": padded_rows(rows.size),
+        "output_rows": padded_rows(len(database.outputs)),
         "state_columns": state_columns.size,
         "input_columns": input_columns.size,
         "auxiliary": auxiliary,
@@ -220,7 +231,7 @@ def _subtract_rigid_body(database: Database, x_ref: FloatArray, A: FloatArray, x
     A[..., iw, ip] = 0.0
 
 
-def _active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDArray[np.int64], ...]:
+def active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDArray[np.int64], ...]:
     """Rows and columns that are not zero in every cell."""
     grid = tuple(range(A.ndim - 2))
     used_a, used_b = np.any(A != 0.0, axis=grid), np.any(B != 0.0, axis=grid)
@@ -229,17 +240,17 @@ def _active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDA
     return tuple(np.ascontiguousarray(np.flatnonzero(pick), dtype=np.int64) for pick in picks)
 
 
-def _padded(rows: int) -> int:
+def padded_rows(rows: int) -> int:
     return max(4, -(-rows // 4) * 4)
 
 
-def _columns(matrix: FloatArray, padded: int) -> FloatArray:
+def columns_of(matrix: FloatArray, padded: int) -> FloatArray:
     """Flatten (..., rows, columns) column after column, each padded with zeros."""
     filled = np.zeros((*matrix.shape[:-2], matrix.shape[-1], padded))
     filled[..., : matrix.shape[-2]] = np.swapaxes(matrix, -1, -2)
     return filled.reshape(*matrix.shape[:-2], -1)
 
 
-def _layers_last(array: FloatArray) -> FloatArray:
+def layers_last(array: FloatArray) -> FloatArray:
     """Reorder [layer, airspeed, nacelle, ...] to [airspeed, nacelle, layer, ...]: a cell's layers lie side by side."""
     return np.ascontiguousarray(np.moveaxis(array, 0, 2))

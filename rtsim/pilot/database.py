@@ -8,12 +8,15 @@ from rtsim.aircraft.condition import AircraftCondition
 from rtsim.choices import OUTER_LOOPS
 from rtsim.lpv.building.build import build_database
 from rtsim.lpv.building.grid import conversion_grid
+from rtsim.lpv.building.lateral import with_lateral
 from rtsim.lpv.building.xv15_grid import Xv15Grid
 from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
-from rtsim.lpv.database import Database, PilotArrays
+from rtsim.lpv.database import Database, StoredArrays
 from rtsim.pilot.schedule import design_schedule
 
-BUILD_SHARE = 0.3
+LATERAL_SHARE = 0.5
+"""Share of the lateral half in the trims and linear models."""
+BUILD_SHARE = 0.5
 """Share of the work that trims and linear models are; the rest are the pilots."""
 
 
@@ -32,9 +35,11 @@ def build_xv15(
         TrimError: The aircraft cannot be trimmed there at all.
     """
     share = BUILD_SHARE if pilots else 1.0
+    grid = Xv15Grid.under(condition)
     database = build_database(
-        Xv15Grid.under(condition), conversion_grid(), jobs=jobs, progress=lambda part: progress(share * part)
+        grid, conversion_grid(), jobs=jobs, progress=lambda part: progress(share * (1.0 - LATERAL_SHARE) * part)
     )
+    database = with_lateral(database, grid, jobs=jobs, progress=lambda part: progress(share * LATERAL_SHARE * part))
     if not pilots:
         return database
     return with_pilots(database, jobs=jobs, progress=lambda part: progress((1.0 - share) * part))
@@ -57,5 +62,5 @@ def with_pilots(database: Database, *, jobs: int, progress: Callable[[float], No
         )
         stored = pilot.to_arrays()
         rounded = {name: round_mantissa(array, JACOBIAN_BITS) for name, array in stored.arrays.items()}
-        database = database.with_pilot(outer_loop, PilotArrays(rounded, stored.attributes))
+        database = database.with_pilot(outer_loop, StoredArrays(rounded, stored.attributes))
     return database

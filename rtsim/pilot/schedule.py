@@ -11,7 +11,7 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.choices import OuterLoop
 from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
-from rtsim.lpv.database import Database, PilotArrays
+from rtsim.lpv.database import Database, StoredArrays
 from rtsim.pilot.design import MocmDesign, design_problem
 from rtsim.pilot.design_plant import DesignPlant, PlantLayout, design_plant, plant_layout
 from rtsim.pilot.problem import MocmError, MocmProblem, build_problem
@@ -57,12 +57,12 @@ class ScheduledPilot:
     attributes: Mapping[str, str | float | int]
     """Settings of the design."""
 
-    def to_arrays(self) -> PilotArrays:
+    def to_arrays(self) -> StoredArrays:
         """Give the pilot as named arrays with attributes, as the database file stores it."""
-        return PilotArrays({name: getattr(self, name) for name in ARRAYS}, dict(self.attributes))
+        return StoredArrays({name: getattr(self, name) for name in ARRAYS}, dict(self.attributes))
 
     @staticmethod
-    def from_arrays(stored: PilotArrays) -> ScheduledPilot:
+    def from_arrays(stored: StoredArrays) -> ScheduledPilot:
         """Take a pilot from named arrays.
 
         Args:

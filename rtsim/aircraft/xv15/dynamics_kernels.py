@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from rtsim.aircraft.motion_kernels import advanced, euler_of, moves_sideways, quaternion_of, quaternion_rate
 from rtsim.aircraft.table_kernels import curve
 from rtsim.aircraft.variables import INPUT, OUTPUT, SCHEDULING_SPEED, STATE
 from rtsim.aircraft.xv15.airframe_kernels import (
@@ -113,22 +114,6 @@ def commanded_controls(
     cyclic = min(max(cyclic, -controls.cyclic_limit), controls.cyclic_limit)
     elevator = min(max(elevator, -controls.elevator_limit), controls.elevator_limit)
     return low + lever * (high - low), cyclic, elevator
-
-
-@inner_kernel
-def moves_sideways(x: FloatArray, u: FloatArray) -> bool:
-    """Whether anything moves or acts out of the plane of symmetry; a heading is no motion.
-
-    Args:
-        x: State.
-        u: Inputs.
-    """
-    moves = False
-    for k in range(STATE.v, STATE.rudder + 1):
-        moves = moves or (x[k] != 0.0 and k != STATE.heading)
-    for k in range(INPUT.lateral_stick, INPUT.contact_yaw + 1):
-        moves = moves or u[k] != 0.0
-    return moves
 
 
 @inner_kernel
@@ -534,13 +519,24 @@ def step(
     n = x.shape[0]
     slopes = work[WORK_COUNT : WORK_COUNT + 4 * n].reshape((4, n))
     point = work[WORK_COUNT + 4 * n : WORK_COUNT + 5 * n]
+    sideways = moves_sideways(x, u)
+    heading = x[STATE.heading]
+    start = quaternion_of(x[STATE.bank], x[STATE.pitch], heading)
+    rate, total = (0.0, 0.0, 0.0, 0.0), start
     for stage in range(4):
         row = (stage + 1) // 2
         fraction = 0.5 * dt if stage < 3 else dt
         for i in range(n):
             point[i] = x[i] if stage == 0 else x[i] + fraction * slopes[stage - 1, i]
+        if sideways:
+            attitude = advanced(start, rate, fraction) if stage > 0 else start
+            point[STATE.bank], point[STATE.pitch], point[STATE.heading] = euler_of(attitude, heading)
+            rate = quaternion_rate(attitude, point[STATE.p], point[STATE.q], point[STATE.r])
+            total = advanced(total, rate, dt / 6.0 if stage in (0, 3) else dt / 3.0)
         u[INPUT.nacelle_rate] = nacelle_path[row, 1]
         u[INPUT.nacelle_acceleration] = nacelle_path[row, 2]
         derivative(tables, point, u, nacelle_path[row, 0], slopes[stage], work)
     for i in range(STATE.north):
         x[i] += dt / 6.0 * (slopes[0, i] + 2.0 * slopes[1, i] + 2.0 * slopes[2, i] + slopes[3, i])
+    if sideways:
+        x[STATE.bank], x[STATE.pitch], x[STATE.heading] = euler_of(total, heading)

@@ -91,7 +91,7 @@ class Xv15Grid:
         """Title, condition, hash of the aircraft's data, versions."""
         configuration = self.aircraft.tables.configuration
         return {
-            "title": "Bell XV-15, symmetric plane: trim map and linear models over the conversion corridor",
+            "title": "Bell XV-15: trim map and linear models over the conversion corridor",
             "mass_kg": float(configuration.mass),
             "air_density_kg_m3": float(configuration.density),
             **self.condition.attributes,
@@ -112,7 +112,7 @@ class Xv15Grid:
         start = None
         if guess is not None:
             start = TrimPoint(guess[0], guess[1], np.zeros(len(OUTPUTS)), np.zeros(len(STATES)), True, 0.0)
-        point = self.aircraft.trim(self._condition(airspeed, nacelle, acceleration), start)
+        point = self.aircraft.trim(self.condition_at(airspeed, nacelle, acceleration), start)
         return GridPoint(point.x, point.u, point.y, point.xdot) if point.converged else None
 
     def reject(self, point: GridPoint, airspeed: float, nacelle: float) -> str | None:
@@ -152,14 +152,30 @@ class Xv15Grid:
             acceleration: Its level acceleration [m/s^2].
         """
         trim = TrimPoint(point.x, point.u, point.y, point.xdot, True, 0.0)
-        model = flown_model(self.aircraft, self._condition(airspeed, nacelle, acceleration), trim)
+        model = flown_model(self.aircraft, self.condition_at(airspeed, nacelle, acceleration), trim)
         return model.A, model.B, model.C, model.D, model.df_dnacelle
 
     def flap(self, airspeed: float, nacelle: float) -> float:
         """Flap deflection of the schedule [rad]."""
         return float(kernels.flap_schedule(self.aircraft.tables.controls, airspeed, nacelle))
 
-    def _condition(self, airspeed: float, nacelle: float, acceleration: float) -> Condition:
+    def near(self, point: TrimPoint, neighbour: TrimPoint, airspeed: float) -> bool:
+        """Whether a trim is flyable, unstalled, and on the branch of its neighbour.
+
+        Args:
+            point: The trim.
+            neighbour: The trim it was continued from.
+        """
+        found, start = (GridPoint(trim.x, trim.u, trim.y, trim.xdot) for trim in (point, neighbour))
+        return self.reject(found, airspeed, 0.0) is None and not self.far_apart(found, start)
+
+    def condition_at(self, airspeed: float, nacelle: float, acceleration: float) -> Condition:
+        """The flight condition of a grid point.
+
+        Args:
+            nacelle: Place on the nacelle axis: below 0 the rotor speed falls.
+            acceleration: Level acceleration [m/s^2].
+        """
         return Condition(
             airspeed=airspeed,
             nacelle_angle=max(nacelle, 0.0),

@@ -12,7 +12,8 @@ from rtsim.aircraft.variables import Variable
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.lpv.cells import fill_invalid
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import AXES, GRIDDED, Database, StoredArrays
+from rtsim.lpv.lateral import LateralData
 from rtsim.lpv.sanity import check_meaning, check_units
 
 OPTIONAL: Final = ("valid", "xdot_ref", "df_dnacelle", "flap", "rotor_speed")
@@ -32,7 +33,8 @@ def assemble_database(
     variables: Mapping[str, Sequence[Variable]],
     *,
     attributes: Mapping[str, str | float | int],
-    pilot: Mapping[str, PilotArrays],
+    pilot: Mapping[str, StoredArrays],
+    lateral: StoredArrays | None = None,
     file: str,
     units: Mapping[str, str] = MappingProxyType({}),
 ) -> Database:
@@ -43,6 +45,7 @@ def assemble_database(
         variables: States, inputs and outputs under ``state``, ``input`` and ``output``.
         attributes: Attributes of the file.
         pilot: Pilot gains by name of the design.
+        lateral: The motion out of the plane of symmetry.
         units: Units of axes and configuration, where the file says them.
 
     Returns:
@@ -77,7 +80,10 @@ def assemble_database(
             outputs=tuple(variables["output"]),
             attributes=attributes,
             pilot=pilot,
+            lateral=lateral,
         )
+        if lateral is not None:
+            LateralData.of(database)  # refuses what does not fit
         check_meaning(database)
         return database
     except InputError as error:

@@ -11,7 +11,7 @@ import numpy as np
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import AXES, GRIDDED, Database, StoredArrays
 from rtsim.lpv.files.assemble import KINDS, LARGEST_CONTENT, LARGEST_FILE, assemble_database, real_array
 from rtsim.lpv.files.mat_layout import unpacked
 from rtsim.outside import read_bytes, regular_file, understanding
@@ -52,6 +52,7 @@ def read_mat(path: str | Path) -> Database:
             {kind: _variables(content, kind, str(file)) for kind in KINDS},
             attributes=_attributes(content.get("attributes")),
             pilot=_pilots(content.get("pilot"), str(file)),
+            lateral=_stored(content["lateral"], "lateral", str(file)) if "lateral" in content else None,
             file=str(file),
         )
 
@@ -80,6 +81,8 @@ def write_mat(database: Database, path: str | Path) -> None:
         content["pilot"] = {
             design: {**pilot.arrays, "attributes": dict(pilot.attributes)} for design, pilot in database.pilot.items()
         }
+    if database.lateral is not None:
+        content["lateral"] = {**database.lateral.arrays, "attributes": dict(database.lateral.attributes)}
     with whole_file(path) as part, part.open("wb") as stream:
         savemat(stream, content, do_compression=True, long_field_names=True)
 
@@ -134,11 +137,11 @@ def _attributes(value: Any) -> dict[str, str | float | int]:
     return attributes
 
 
-def _pilots(value: Any, file: str) -> dict[str, PilotArrays]:
-    pilots = {}
-    for design, record in _record(value).items():
-        parts = _record(record)
-        attributes = _attributes(parts.pop("attributes", None))
-        arrays = {name: real_array(f"pilot.{design}.{name}", entry, file) for name, entry in parts.items()}
-        pilots[design] = PilotArrays(arrays, attributes)
-    return pilots
+def _pilots(value: Any, file: str) -> dict[str, StoredArrays]:
+    return {design: _stored(record, f"pilot.{design}", file) for design, record in _record(value).items()}
+
+
+def _stored(value: Any, path: str, file: str) -> StoredArrays:
+    parts = _record(value)
+    attributes = _attributes(parts.pop("attributes", None))
+    return StoredArrays({name: real_array(f"{path}.{name}", entry, file) for name, entry in parts.items()}, attributes)

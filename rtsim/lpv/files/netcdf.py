@@ -1,6 +1,7 @@
 """The database as a self-describing NetCDF-4 file: dimensions, coordinates, units, long names, attributes.
 
-Layout: the root group holds axes, trim map and linear models; ``/pilot/<design>`` holds the gains of one design.
+Layout: the root group holds axes, trim map and linear models; ``/pilot/<design>`` holds the gains of one design,
+``/lateral`` the motion out of the plane of symmetry.
 A file is written beside its target and renamed, so a reader never meets half of one.
 """
 
@@ -18,7 +19,7 @@ import numpy.typing as npt
 
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError
-from rtsim.lpv.database import AXES, GRIDDED, Database, PilotArrays
+from rtsim.lpv.database import AXES, GRIDDED, Database, StoredArrays
 from rtsim.lpv.files import netcdf_trial
 from rtsim.lpv.files.assemble import KINDS, LARGEST_CONTENT, LARGEST_FILE, assemble_database, real_array
 from rtsim.lpv.sanity import AXIS_UNITS
@@ -30,6 +31,8 @@ SHIPPED: Final = Path(__file__).parents[2] / "aircraft" / "xv15" / "data" / "xv1
 FORMAT: Final = "rtsim LPV database 1"
 """Value of the attribute ``format``; raised when the layout changes."""
 
+LATERAL: Final = "lateral"
+"""Group of the motion out of the plane of symmetry."""
 _GRID = ("layer", "airspeed", "nacelle")
 _TAILS: Final[Mapping[str, tuple[str, ...]]] = {
     "x_ref": ("state",), "u_ref": ("input",), "y_ref": ("output",), "xdot_ref": ("state",), "df_dnacelle": ("state",),
@@ -97,6 +100,7 @@ def _try(file: Path, mend: str) -> None:
 def _measure(dataset: Any) -> None:
     """Refuse what would take more memory than any database: a damaged file says anything of its sizes."""
     groups = [dataset, *(dataset.groups["pilot"].groups.values() if "pilot" in dataset.groups else ())]
+    groups += [dataset.groups[LATERAL]] if LATERAL in dataset.groups else []
     sizes = [
         math.prod(int(length) for length in variable.shape) for group in groups for variable in group.variables.values()
     ]
@@ -152,15 +156,20 @@ def _write(dataset: Any, database: Database) -> None:
             values = np.where(database.valid.reshape(database.valid.shape + (1,) * len(_TAILS[name])), values, np.nan)
         _put(dataset, name, _GRID + _TAILS[name], values)
     for design, pilot in database.pilot.items():
-        group = dataset.createGroup(f"pilot/{design}")
-        group.setncatts(dict(pilot.attributes))
-        for name, array in pilot.arrays.items():
-            dimensions = []
-            for axis, size in enumerate(array.shape):
-                dimensions.append(f"{name}_{axis}")
-                group.createDimension(dimensions[-1], size)
-            variable = group.createVariable(name, "f8", dimensions, zlib=bool(array.shape), complevel=6, shuffle=True)
-            variable[...] = array
+        _put_group(dataset.createGroup(f"pilot/{design}"), pilot)
+    if database.lateral is not None:
+        _put_group(dataset.createGroup(LATERAL), database.lateral)
+
+
+def _put_group(group: Any, stored: StoredArrays) -> None:
+    group.setncatts(dict(stored.attributes))
+    for name, array in stored.arrays.items():
+        dimensions = []
+        for axis, size in enumerate(array.shape):
+            dimensions.append(f"{name}_{axis}")
+            group.createDimension(dimensions[-1], size)
+        variable = group.createVariable(name, "f8", dimensions, zlib=bool(array.shape), complevel=6, shuffle=True)
+        variable[...] = array
 
 
 def _put(dataset: Any, name: str, dimensions: tuple[str, ...], values: npt.NDArray[Any]) -> None:
@@ -190,6 +199,7 @@ def _read(dataset: Any, file: str) -> Database:
         {kind: _read_variables(dataset, kind, file) for kind in KINDS},
         attributes=attributes,
         pilot=_read_pilots(dataset, file),
+        lateral=_read_group(dataset.groups[LATERAL], LATERAL, file) if LATERAL in dataset.groups else None,
         file=file,
         units={
             name: str(dataset.variables[name].getncattr("units"))
@@ -219,17 +229,16 @@ def _read_variables(dataset: Any, kind: str, file: str) -> tuple[Variable, ...]:
     return tuple(Variable(*row) for row in zip(*columns, strict=True))
 
 
-def _read_pilots(dataset: Any, file: str) -> dict[str, PilotArrays]:
+def _read_pilots(dataset: Any, file: str) -> dict[str, StoredArrays]:
     if "pilot" not in dataset.groups:
         return {}
-    pilots = {}
-    for design, group in dataset.groups["pilot"].groups.items():
-        arrays = {
-            name: real_array(f"pilot/{design}/{name}", variable[...], file)
-            for name, variable in group.variables.items()
-        }
-        pilots[design] = PilotArrays(arrays, {key: _plain(group.getncattr(key)) for key in group.ncattrs()})
-    return pilots
+    groups = dataset.groups["pilot"].groups.items()
+    return {design: _read_group(group, f"pilot/{design}", file) for design, group in groups}
+
+
+def _read_group(group: Any, path: str, file: str) -> StoredArrays:
+    arrays = {name: real_array(f"{path}/{name}", variable[...], file) for name, variable in group.variables.items()}
+    return StoredArrays(arrays, {key: _plain(group.getncattr(key)) for key in group.ncattrs()})
 
 
 def _plain(value: Any) -> str | float | int:

@@ -15,10 +15,10 @@ from scipy.io import loadmat, savemat
 from rtsim.aircraft.variables import Variable
 from rtsim.errors import InputError, OutputError
 from rtsim.lpv.cells import fill_invalid, quantized, round_mantissa
-from rtsim.lpv.database import GRIDDED, PilotArrays
+from rtsim.lpv.database import GRIDDED, StoredArrays
 from rtsim.lpv.files.storage import load_database, save_database
 
-PILOT = PilotArrays(
+PILOT = StoredArrays(
     {"gain": np.linspace(0.0, 1.0, 24).reshape(2, 3, 4)}, {"delay": 0.15, "note": "made up", "order": 2}
 )
 
