@@ -96,7 +96,7 @@ def sideways_work_size(tables: SidewaysTables) -> int:
 
 
 @inner_kernel
-def turning_load_factor(x: FloatArray) -> float:
+def turning_load_factor(x: FloatArray, down: tuple[float, float, float]) -> float:
     """Load factor of the turn that is flown: 1 as long as the wings are level, whatever the pitch rate is.
 
     Pulling up is what the layers of accelerated trims follow, in the symmetric aircraft too; here the pitch rate counts
@@ -104,14 +104,15 @@ def turning_load_factor(x: FloatArray) -> float:
 
     Args:
         x: State.
+        down: Direction of gravity in body axes.
     """
-    st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
-    sb, cb = math.sin(x[STATE.bank]), math.cos(x[STATE.bank])
+    gx, gy, gz = down
     p, r = x[STATE.p], x[STATE.r]
-    q = (x[STATE.q] * sb + r * cb) * sb
-    ahead = GRAVITY * st + q * x[STATE.w] - r * x[STATE.v]
-    down = GRAVITY * ct * cb + q * x[STATE.u] - p * x[STATE.v]
-    return math.sqrt(ahead * ahead + down * down) / GRAVITY
+    across = max(gy * gy + gz * gz, 1e-9)
+    q = (x[STATE.q] * gy + r * gz) * gy / across
+    ahead = q * x[STATE.w] - r * x[STATE.v] - GRAVITY * gx
+    below = GRAVITY * gz + q * x[STATE.u] - p * x[STATE.v]
+    return math.sqrt(ahead * ahead + below * below) / GRAVITY
 
 
 @inner_kernel
@@ -139,26 +140,33 @@ def _at_corners(table: FloatArray, i: int, j: int, k: int, work: FloatArray) -> 
 
 @inner_kernel
 def _schedule(
-    tables: SidewaysTables, x: FloatArray, u: FloatArray, nacelle: float, work: FloatArray, place: FloatArray
+    tables: SidewaysTables,
+    x: FloatArray,
+    u: FloatArray,
+    attitude: Quaternion,
+    nacelle: float,
+    work: FloatArray,
+    place: FloatArray,
 ) -> tuple[int, int]:
-    """Find where the aircraft is in all its tables; the symmetric part into ``work``, the lateral one into ``place``."""
+    """Find where the aircraft is in all its tables: the symmetric part into ``work``, the rest into ``place``."""
     symmetric = tables.symmetric
-    pitch, bank = x[STATE.pitch], x[STATE.bank]
-    st, ct, sb, cb = math.sin(pitch), math.cos(pitch), math.sin(bank), math.cos(bank)
+    down = down_of(attitude)
+    gx, gy, gz = down
+    ct = math.sqrt(max(1.0 - gx * gx, 1e-9))
     ua, va, wa = x[STATE.u] + u[INPUT.gust_u], x[STATE.v] + u[INPUT.gust_v], x[STATE.w] + u[INPUT.gust_w]
-    ahead = ua * ct + (va * sb + wa * cb) * st
+    ahead = ua * ct - (va * gy + wa * gz) * gx / ct
     i, j = weigh_corners(symmetric, ahead, nacelle, work)
     flags = int(work[WORK.flags])
-    if abs(bank) > LARGEST_BANK:
+    if abs(x[STATE.bank]) > LARGEST_BANK:
         flags |= FLAG_BANK
     headwind = symmetric.alpha_speed + max(0.0, -ahead)
-    alpha = math.atan2(wa + headwind * st * cb, ua + headwind * ct)
+    alpha = math.atan2(wa - headwind * gx * gz / ct, ua + headwind * ct)
 
     # Load factor: two neighbouring loaded trims, level flight before the first.
     loads = tables.load_factor.shape[0]
     for k in range(loads + 1):
         place[SCHEDULE.share + k] = 0.0
-    excess = max(turning_load_factor(x) - 1.0, 0.0)
+    excess = max(turning_load_factor(x, down) - 1.0, 0.0)
     first = tables.load_factor[0] - 1.0
     if excess > 0.0:
         below, above = 0, min(excess / first, 1.0)
@@ -254,11 +262,16 @@ def _add_lateral(
     for c in range(of_inputs):
         column = tables.input_columns[c]
         deviation[of_states + c] = u[NU + column] - side * reference[LX + column]
+    # Row by row over the columns that always act: their number is known when this is compiled.
+    always = of_states + roles.pilot_columns
     for k in range(rows):
         row = side * reference[LX + LU + k]
-        for c in range(of_states + of_inputs):
+        for c in range(always):
             row += columns[rows * c + k] * deviation[c]
         total[k] = row
+    for c in range(always, of_states + of_inputs):
+        for k in range(rows):
+            total[k] += columns[rows * c + k] * deviation[c]
     for k in range(LX):
         slope[NX + k] = 0.0
     for k in range(tables.rows.shape[0]):
@@ -334,7 +347,9 @@ def sideways_step(
     total = work[at + 2 * WHOLE : at + 3 * WHOLE]
 
     work[WORK.flags] = 0.0
-    i, j = _schedule(tables, x, u, nacelle_path[1, 0], work, place)
+    heading = x[STATE.heading]
+    start = quaternion_of(x[STATE.bank], x[STATE.pitch], heading)
+    i, j = _schedule(tables, x, u, start, nacelle_path[1, 0], work, place)
     blend(symmetric.cells, i, j, block, work, model)
     _add_slip(tables.slip, i, j, place, work, slip, slip.shape[0])
     for k in range(NX + NU + rows):
@@ -346,8 +361,6 @@ def sideways_step(
     for k in range(WHOLE):
         stage_x[k] = x[k]
         total[k] = 0.0
-    heading = x[STATE.heading]
-    start = quaternion_of(x[STATE.bank], x[STATE.pitch], heading)
     attitude, sums = start, start
     for stage in range(4):
         row = (stage + 1) // 2
@@ -393,7 +406,8 @@ def sideways_outputs(
     lateral = work[at : at + count]
     at += max(count, tables.cells.shape[3])
     slip = work[at : at + tables.slip.shape[3]]
-    i, j = _schedule(tables, x, u, nacelle_angle, work, place)
+    attitude = quaternion_of(x[STATE.bank], x[STATE.pitch], 0.0)
+    i, j = _schedule(tables, x, u, attitude, nacelle_angle, work, place)
     acting = roles.inputs if auxiliary_act(symmetric, u) else roles.auxiliary
     block = symmetric.output_cells.shape[3] - (roles.inputs - acting) * rows
     model = work[WORK.size : WORK.size + max(block, NX + NU)]

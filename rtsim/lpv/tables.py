@@ -241,6 +241,7 @@ def active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDAr
 
 
 def padded_rows(rows: int) -> int:
+    """Rows of a column in the packed cells: at least four, a multiple of four."""
     return max(4, -(-rows // 4) * 4)
 
 
