@@ -12,6 +12,7 @@ from rtsim.lpv.building.lateral import with_lateral
 from rtsim.lpv.building.xv15_grid import Xv15Grid
 from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
 from rtsim.lpv.database import Database, StoredArrays
+from rtsim.pilot.lateral_schedule import LATERAL, design_lateral
 from rtsim.pilot.schedule import design_schedule
 
 LATERAL_SHARE = 0.5
@@ -56,11 +57,15 @@ def with_pilots(database: Database, *, jobs: int, progress: Callable[[float], No
     Returns:
         The database with the pilots' gains.
     """
+    designs = len(OUTER_LOOPS) + (database.lateral is not None)
     for outer_loop in OUTER_LOOPS:
         pilot = design_schedule(
-            database, outer_loop=outer_loop, jobs=jobs, progress=lambda part: progress(part / len(OUTER_LOOPS))
+            database, outer_loop=outer_loop, jobs=jobs, progress=lambda part: progress(part / designs)
         )
         stored = pilot.to_arrays()
         rounded = {name: round_mantissa(array, JACOBIAN_BITS) for name, array in stored.arrays.items()}
         database = database.with_pilot(outer_loop, StoredArrays(rounded, stored.attributes))
-    return database
+    if database.lateral is None:
+        return database
+    stored = design_lateral(database, jobs=jobs, progress=lambda part: progress(part / designs)).to_arrays()
+    return database.with_pilot(LATERAL, stored)

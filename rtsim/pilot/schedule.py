@@ -119,8 +119,13 @@ def point_problem(plant: DesignPlant, settings: PilotSettings, *, integrators: b
     )
 
 
-def _design_point(problem: MocmProblem, neighbour: MocmDesign | None) -> MocmDesign:
-    """Design from the neighbour, or from nothing where that start leads astray."""
+def design_point(problem: MocmProblem, neighbour: MocmDesign | None) -> MocmDesign:
+    """Design from the neighbour, or from nothing where that start leads astray.
+
+    Args:
+        problem: What is asked.
+        neighbour: Design of the grid point before, or None.
+    """
     if neighbour is not None:
         try:
             return design_problem(problem, start=neighbour)
@@ -141,7 +146,7 @@ def _design_row(
         design: MocmDesign | None
         try:
             problem = point_problem(plant, settings, integrators=layout.integrators)
-            design = _design_point(problem, neighbour)
+            design = design_point(problem, neighbour)
         except MocmError:
             design = None  # the cell is marked and filled; the map in docs/pilot.md shows it
         neighbour = design if design is not None else neighbour
@@ -192,17 +197,24 @@ def design_schedule(
                 arrays.setdefault(name, np.zeros(shape + value.shape))[v, nacelle] = value
         if progress is not None:
             progress(1.0 / shape[1])
-    _fill(arrays, valid, database)
-    # six significant digits, as the database's derivatives: what is flown from memory and from the file is the same
-    arrays = {name: round_mantissa(value, JACOBIAN_BITS) for name, value in arrays.items()}
+    fill_cells(arrays, valid, database)
     return ScheduledPilot(
         outer_loop=outer_loop,
         states=layout.states,
         displays=layout.displays,
         valid=valid,
         attributes=_attributes(chosen, layout, outer_loop),
-        **arrays,
+        **rounded_gains(arrays),
     )
+
+
+def rounded_gains(arrays: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """Six significant digits, as the database's derivatives: what is flown from memory and from the file is the same.
+
+    Args:
+        arrays: Gains by name.
+    """
+    return {name: round_mantissa(value, JACOBIAN_BITS) for name, value in arrays.items()}
 
 
 def _point_arrays(plant: DesignPlant, design: MocmDesign) -> dict[str, FloatArray]:
@@ -220,8 +232,14 @@ def _point_arrays(plant: DesignPlant, design: MocmDesign) -> dict[str, FloatArra
     }
 
 
-def _fill(arrays: dict[str, Any], valid: FloatArray, database: Database) -> None:
-    """Copy the nearest designed airspeed of the same nacelle angle into cells without a design."""
+def fill_cells(arrays: dict[str, Any], valid: FloatArray, database: Database) -> None:
+    """Copy the nearest designed airspeed of the same nacelle angle into cells without a design.
+
+    Args:
+        arrays: Arrays with leading axes [airspeed, nacelle], changed in place.
+        valid: 1 where a pilot was designed.
+        database: Says the airspeeds.
+    """
     for nacelle in range(valid.shape[1]):
         good = np.flatnonzero(valid[:, nacelle] > 0.0)
         if not good.size:

@@ -76,6 +76,54 @@ class PilotSettings:
         return (self.airspeed, self.altitude, self.climb_rate, self.pitch, self.pitch_rate)
 
 
+@dataclass(frozen=True, slots=True)
+class LateralPilotSettings:
+    """What makes the pilot's lateral half besides the aircraft; the rest it shares with the other. SI and radians."""
+
+    lateral_velocity: DisplaySettings
+    """Lateral airspeed [m/s]."""
+    roll_rate: DisplaySettings
+    """Roll-rate deviation [rad/s]; same instrument as the bank."""
+    bank: DisplaySettings
+    """Bank deviation [rad]."""
+    yaw_rate: DisplaySettings
+    """Yaw-rate deviation [rad/s]; same instrument as the heading."""
+    heading: DisplaySettings
+    """Heading error [rad]."""
+    lateral_stick_lag: float
+    """Neuromotor lag of the hand on the lateral stick [s]."""
+    pedal_lag: float
+    """Neuromotor lag of the feet [s]."""
+    lateral_stick_rate_limit: float
+    """Fastest movement of the lateral stick [1/s]."""
+    pedal_rate_limit: float
+    """Fastest movement of the pedals [1/s]."""
+    integral_time: float
+    integral_noise_ratio: float
+    delay: float
+    motor_noise_ratio: float
+    gust_intensity: float
+    gust_length: float
+    gust_least_airspeed: float
+    schedule_time: float
+
+    @property
+    def displays(self) -> tuple[DisplaySettings, ...]:
+        """Lateral velocity, roll rate, bank, yaw rate, heading."""
+        return (self.lateral_velocity, self.roll_rate, self.bank, self.yaw_rate, self.heading)
+
+
+_SHARED = ("integral_time", "integral_noise_ratio", "delay", "motor_noise_ratio", "gust_intensity", "gust_length",
+           "gust_least_airspeed", "schedule_time")  # fmt: skip
+_LATERAL_DISPLAYS = (
+    ("lateral_velocity", "m_s"), ("roll_rate", "deg_s"), ("bank", "deg"), ("yaw_rate", "deg_s"), ("heading", "deg"),
+)  # fmt: skip
+_LATERAL_NUMBERS = (
+    ("lateral_stick_lag", "s", 0.01, 2.0),
+    ("pedal_lag", "s", 0.01, 2.0),
+    ("lateral_stick_rate_limit", "per_s", 0.01, 100.0),
+    ("pedal_rate_limit", "per_s", 0.01, 100.0),
+)
 _DISPLAYS = (("airspeed", "m_s"), ("altitude", "m"), ("climb_rate", "m_s"), ("pitch", "deg"), ("pitch_rate", "deg_s"))
 _NUMBERS = (
     ("integral_time", "s", 0.1, 1000.0),
@@ -120,3 +168,15 @@ def _display(part: Part, unit: str) -> DisplaySettings:
         attention=part.number("attention", low=0.001, high=1.0),
         noise_ratio=part.number("noise_ratio", low=0.0, high=1.0),
     )
+
+
+def lateral_pilot_settings(profile: AircraftProfile) -> LateralPilotSettings:
+    """The settings of the lateral half of an aircraft's pilot.
+
+    Raises:
+        InputError: A value is missing or out of range.
+    """
+    part, shared = profile.pilot.table("lateral"), pilot_settings(profile)
+    displays: dict[str, Any] = {name: _display(part.table(name), unit) for name, unit in _LATERAL_DISPLAYS}
+    numbers = {name: part.number(f"{name}_{unit}", low=low, high=high) for name, unit, low, high in _LATERAL_NUMBERS}
+    return LateralPilotSettings(**displays, **numbers, **{name: getattr(shared, name) for name in _SHARED})

@@ -1,0 +1,86 @@
+"""The plant that the pilot's lateral half is designed for at one grid point: rigid body, hands, gust and integrals.
+
+Made as ``rtsim.pilot.design_plant`` makes the longitudinal one: the rotors' states are residualized, the actuators of
+one hand become one lag, a side gust gets a first-order Dryden filter. Displays are lateral airspeed (gust included),
+roll rate, bank, yaw rate and heading, and the integrals of heading and of the aircraft's own lateral velocity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_STATES, of_role, position
+from rtsim.arrays import FloatArray
+from rtsim.lpv.lateral import LateralData
+from rtsim.pilot.weights import LateralPilotSettings
+
+RIGID = ("v", "p", "r", "bank", "heading")
+"""Rigid-body states of the plant."""
+HANDS = ("lateral_stick", "pedal")
+"""The pilot's hands, as inputs of the database."""
+STATES = (*RIGID, "lateral_stick_lag", "pedal_lag", "gust_v", "heading_integral", "lateral_velocity_integral")
+"""Names of the plant's states."""
+DISPLAYS = ("lateral_velocity", "roll_rate", "bank", "yaw_rate", "heading", "heading_integral",
+            "lateral_velocity_integral")  # fmt: skip
+"""What the pilot sees."""
+
+
+@dataclass(frozen=True, slots=True)
+class LateralPlant:
+    """Linear plant of one grid point, deviations from straight flight, controls -1..1 right. SI and radians."""
+
+    A: FloatArray
+    """Dynamics (10, 10)."""
+    B: FloatArray
+    """Controls (10, 2)."""
+    C: FloatArray
+    """Displays (7, 10)."""
+    E: FloatArray
+    """White noise of the gust filter (10, 1)."""
+
+
+def lateral_plant(
+    data: LateralData, where: tuple[int, int], airspeed: float, settings: LateralPilotSettings
+) -> LateralPlant:
+    """Build the design plant of one grid point in level flight.
+
+    Args:
+        data: The lateral half of the aircraft.
+        where: Numbers of airspeed and nacelle angle.
+        airspeed: Airspeed there [m/s].
+        settings: Gust to reckon with.
+    """
+    full_a, full_b = data.A[(0, *where)], data.B[(0, *where)]
+    rigid = [position(LATERAL_STATES, name) for name in RIGID]
+    lags = list(of_role(LATERAL_STATES, "actuator"))
+    slow = rigid + lags
+    fast = [k for k in range(len(LATERAL_STATES)) if k not in slow]
+    inputs = [position(LATERAL_INPUTS, name) for name in (*HANDS, "gust_v")]
+    inner = np.linalg.solve(
+        full_a[np.ix_(fast, fast)], np.hstack([full_a[np.ix_(fast, slow)], full_b[np.ix_(fast, inputs)]])
+    )
+    a = full_a[np.ix_(slow, slow)] - full_a[np.ix_(slow, fast)] @ inner[:, : len(slow)]
+    b = full_b[np.ix_(slow, inputs)] - full_a[np.ix_(slow, fast)] @ inner[:, len(slow) :]
+
+    n, r = len(STATES), len(RIGID)
+    plant_a, plant_b, plant_e = np.zeros((n, n)), np.zeros((n, len(HANDS))), np.zeros((n, 1))
+    plant_a[:r, :r] = a[:r, :r]
+    for hand in range(len(HANDS)):
+        driven = [k for k in range(r, len(slow)) if b[k, hand] != 0.0]
+        rates = [-a[k, k] for k in driven]
+        plant_a[:r, r + hand] = a[:r, driven] @ [b[k, hand] / rate for k, rate in zip(driven, rates, strict=True)]
+        plant_a[r + hand, r + hand], plant_b[r + hand, hand] = -min(rates), min(rates)
+    gust = r + len(HANDS)
+    plant_a[:r, gust] = b[:r, len(HANDS)]
+    pole = max(abs(airspeed), settings.gust_least_airspeed) / settings.gust_length
+    plant_a[gust, gust] = -pole
+    plant_e[gust, 0] = settings.gust_intensity * np.sqrt(2.0 * pole)
+    plant_a[n - 2, RIGID.index("heading")] = 1.0
+    plant_a[n - 1, RIGID.index("v")] = 1.0  # the own velocity: as for the airspeed's integral in the longitudinal plant
+    c = np.zeros((len(DISPLAYS), n))
+    for row, state in enumerate((0, 1, 3, 2, 4, n - 2, n - 1)):
+        c[row, state] = 1.0
+    c[0, gust] = 1.0
+    return LateralPlant(plant_a, plant_b, c, plant_e)
