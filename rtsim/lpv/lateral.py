@@ -104,7 +104,9 @@ class LateralData:
         data = LateralData(**{item.name: np.atleast_1d(arrays[item.name]) for item in fields(LateralData)})
         for name, shape in _shapes(database, data).items():
             if getattr(data, name).shape != shape:
-                raise InputError("wrong shape", key=f"lateral/{name}", value=getattr(data, name).shape, allowed=shape)
+                raise InputError(
+                    "wrong shape", key=f"lateral/{name}", value=getattr(data, name).shape, allowed=f"{shape}"
+                )
         for name, low in (("load_factor", 1.0), ("lateral_velocity", 0.0)):
             axis = getattr(data, name)
             if axis[0] <= low or np.any(np.diff(axis) <= 0.0):

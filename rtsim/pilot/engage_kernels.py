@@ -87,14 +87,21 @@ def mocm_engage(
             state[S_ESTIMATE + tables.lags[hand]] = held
         state[S_ESTIMATE + n + delay + hand] = held
         state[hands_at + hand] = held
-    _rest_delay(tables, tables.model_delay_a, state, hands_at, S_ESTIMATE + n)
-    _rest_delay(tables, tables.output_delay_a, state, hands_at, delay_at)
-    _start_integrals(tables, cell, state, trim, own[TARGET.airspeed], errors)
+    rest_delay(tables, tables.model_delay_a, state, hands_at, S_ESTIMATE + n)
+    rest_delay(tables, tables.output_delay_a, state, hands_at, delay_at)
+    start_integrals(tables, cell, state, trim, own[TARGET.airspeed], errors)
 
 
 @allocating_kernel
-def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at: int, delay_at: int) -> None:
-    """Put a delay filter at rest at the present hands: a x_d = -b u_p, by elimination."""
+def rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at: int, delay_at: int) -> None:
+    """Put a delay filter at rest at the present hands: a x_d = -b u_p, by elimination.
+
+    Args:
+        a: Dynamics of the filter.
+        state: The pilot's state.
+        hands_at: Where the hands stand in it.
+        delay_at: Where the filter stands in it.
+    """
     delay = tables.roles.delay
     if delay == 0:
         return
@@ -121,10 +128,18 @@ def _rest_delay(tables: PilotTables, a: FloatArray, state: FloatArray, hands_at:
 
 
 @allocating_kernel
-def _start_integrals(
+def start_integrals(
     tables: PilotTables, cell: FloatArray, state: FloatArray, trim: FloatArray, airspeed: float, errors: FloatArray
 ) -> None:
-    """Choose the integrals so that the wanted controls equal the present ones, within the integrals' limits."""
+    """Choose the integrals so that the wanted controls equal the present ones, within the integrals' limits.
+
+    Args:
+        cell: Gains.
+        state: The pilot's state.
+        trim: Pitch, hands and slopes; for the outer loops.
+        airspeed: Commanded airspeed [m/s]; for the outer loops.
+        errors: Deviations of the displays; for the outer loops.
+    """
     roles = tables.roles
     numbers = tables.numbers
     n = roles.plant

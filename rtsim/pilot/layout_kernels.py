@@ -203,6 +203,23 @@ def clip(value: float, limit: float) -> float:
 
 
 @inner_kernel
+def capture(state: FloatArray, place: int, limits: tuple[float, float], dt: float) -> None:
+    """Lead one offset and its rate to zero: critically damped, its speed and acceleration limited.
+
+    Args:
+        state: The pilot's state.
+        place: Place of the offset in it; its rate follows.
+        limits: Largest speed and acceleration.
+    """
+    speed, acceleration = limits
+    far = 2.0 * speed / CAPTURE_FREQUENCY
+    offset = clip(state[place], far)
+    change = clip(-CAPTURE_FREQUENCY * (CAPTURE_FREQUENCY * offset + 2.0 * state[place + 1]), acceleration)
+    state[place] += dt * (state[place + 1] + 0.5 * dt * change)
+    state[place + 1] += dt * change
+
+
+@inner_kernel
 def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: float, out: FloatArray) -> None:
     """Pitch and hands of the commanded trim.
 

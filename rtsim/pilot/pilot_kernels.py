@@ -40,7 +40,6 @@ from rtsim.pilot.layout_kernels import (
     CAPTURE_AIRSPEED_RATE,
     CAPTURE_CLIMB,
     CAPTURE_CLIMB_RATE,
-    CAPTURE_FREQUENCY,
     DISPLAY,
     GIVE_WAY_TIME,
     INTEGRALS,
@@ -57,6 +56,7 @@ from rtsim.pilot.layout_kernels import (
     SAME_CONTROL,
     TARGET,
     PilotTables,
+    capture,
     clip,
     commanded_trim,
     demand,
@@ -123,17 +123,6 @@ def mocm_output_in(
     for hand in range(tables.roles.hands):
         value = work[1 + hand] + demand(tables, state, hand)
         out[hand] = min(tables.limits[1, hand], max(tables.limits[0, hand], value))
-
-
-@inner_kernel
-def _capture(state: FloatArray, place: int, limits: tuple[float, float], dt: float) -> None:
-    """Lead one offset and its rate to zero: critically damped, its speed and acceleration limited."""
-    speed, acceleration = limits
-    far = 2.0 * speed / CAPTURE_FREQUENCY
-    offset = clip(state[place], far)
-    change = clip(-CAPTURE_FREQUENCY * (CAPTURE_FREQUENCY * offset + 2.0 * state[place + 1]), acceleration)
-    state[place] += dt * (state[place + 1] + 0.5 * dt * change)
-    state[place + 1] += dt * change
 
 
 @inner_kernel
@@ -348,8 +337,8 @@ def mocm_advance_in(
         state[offset_at + 1] += dt / GIVE_WAY_TIME * (speeding - own[TARGET.airspeed_rate])
         state[offset_at] += dt * (state[offset_at + 1] + error_v / GIVE_WAY_TIME)
     else:
-        _capture(state, offset_at, (CAPTURE_AIRSPEED_RATE, CAPTURE_AIRSPEED_JERK), dt)
-    _capture(state, offset_at + 2, (CAPTURE_CLIMB, CAPTURE_CLIMB_RATE), dt)
+        capture(state, offset_at, (CAPTURE_AIRSPEED_RATE, CAPTURE_AIRSPEED_JERK), dt)
+    capture(state, offset_at + 2, (CAPTURE_CLIMB, CAPTURE_CLIMB_RATE), dt)
     state[offset_at] += error_v - clip(error_v, LARGEST_AIRSPEED_ERROR)
     state[offset_at + 2] += error_h - clip(error_h, LARGEST_ALTITUDE_ERROR)
     state[S_FILTERED] += tables.numbers[NUMBER.filter] * (airspeed - state[S_FILTERED])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,7 +90,8 @@ def _tables(database: Database, pilot: ScheduledPilot, dt: float) -> PilotTables
             "the gains were designed for another database", key=f"pilot/{pilot.outer_loop}", value=pilot.A.shape[:2],
             allowed=f"{grid} cells, states {' '.join(layout.states)}", mend="build them again with rtsim model build",
         )  # fmt: skip
-    roles, cells, a_columns, c_columns = _pack_cells(pilot, layout)
+    positions = dict(zip(RIGID_BODY_STATES, layout.rigid, strict=True))
+    roles, cells, a_columns, c_columns = pack_cells(pilot, positions, integrators=layout.integrators)
     settings = pilot.attributes
     tau = np.full(len(CONTROLS), float(settings["delay"]))
     order, kind = int(settings["pade_order"]), "taylor" if settings["pade_kind"] == "taylor" else "pade"
@@ -146,8 +148,16 @@ def _columns(matrix: FloatArray, padded: int) -> FloatArray:
     return filled.reshape(*matrix.shape[:-2], -1)
 
 
-def _pack_cells(pilot: ScheduledPilot, layout: PlantLayout) -> tuple[PilotRoles, FloatArray, IntArray, IntArray]:
-    """Flatten the gains of each cell and note where each section starts."""
+def pack_cells(
+    pilot: ScheduledPilot, positions: Mapping[str, int], *, integrators: bool
+) -> tuple[PilotRoles, FloatArray, IntArray, IntArray]:
+    """Flatten the gains of each cell and note where each section starts.
+
+    Args:
+        pilot: The gains.
+        positions: Places of the rigid body in the aircraft state.
+        integrators: The plant's last states are integrals of the first displays' errors.
+    """
     n, hands, displays = pilot.A.shape[-1], pilot.G2.shape[-1], pilot.C.shape[-2]
     estimate = pilot.F.shape[-2]
     rows, seen, wide = _padded(n), _padded(displays), _padded(estimate)
@@ -165,17 +175,17 @@ def _pack_cells(pilot: ScheduledPilot, layout: PlantLayout) -> tuple[PilotRoles,
         "g": pilot.G2.reshape(*grid, -1),
         "v": noise,
     }
-    positions = np.cumsum([0, *(section.shape[-1] for section in sections.values())]).tolist()
+    starts = np.cumsum([0, *(section.shape[-1] for section in sections.values())]).tolist()
     roles = PilotRoles(
-        loop=Size(kernels.LOOP_INTEGRATORS if layout.integrators else kernels.LOOP_PI),
+        loop=Size(kernels.LOOP_INTEGRATORS if integrators else kernels.LOOP_PI),
         plant=Size(n),
         delay=Size(estimate - n - hands),
         hands=Size(hands),
         displays=Size(displays),
         a_columns=Size(a_columns.size),
         c_columns=Size(c_columns.size),
-        **{name: Size(place) for name, place in zip(RIGID_BODY_STATES, layout.rigid, strict=True)},
-        **{name: Size(place) for name, place in zip((*sections, "end"), positions, strict=True)},
+        **{name: Size(place) for name, place in positions.items()},
+        **{name: Size(place) for name, place in zip((*sections, "end"), starts, strict=True)},
     )
     cells = np.ascontiguousarray(np.concatenate(list(sections.values()), axis=-1))
     return roles, cells, a_columns.astype(np.int64), c_columns.astype(np.int64)

@@ -178,5 +178,7 @@ def lateral_pilot_settings(profile: AircraftProfile) -> LateralPilotSettings:
     """
     part, shared = profile.pilot.table("lateral"), pilot_settings(profile)
     displays: dict[str, Any] = {name: _display(part.table(name), unit) for name, unit in _LATERAL_DISPLAYS}
-    numbers = {name: part.number(f"{name}_{unit}", low=low, high=high) for name, unit, low, high in _LATERAL_NUMBERS}
+    numbers: dict[str, Any] = {
+        name: part.number(f"{name}_{unit}", low=low, high=high) for name, unit, low, high in _LATERAL_NUMBERS
+    }
     return LateralPilotSettings(**displays, **numbers, **{name: getattr(shared, name) for name in _SHARED})
