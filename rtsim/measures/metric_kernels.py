@@ -326,6 +326,8 @@ def _law_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> None
         row[COLUMN.protection_stick_reason],
         row[COLUMN.protection_lever_reason],
         row[COLUMN.protection_nacelle_reason],
+        row[COLUMN.protection_lateral_stick_reason],
+        row[COLUMN.protection_pedal_reason],
     ):
         if reason in (law.REASON_LOW, law.REASON_HIGH, law.REASON_GATE):
             corridor = True
