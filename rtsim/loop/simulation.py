@@ -241,6 +241,8 @@ class Simulation:
     def set_pilot(self, mode: PilotMode, *, command: Command | None = None) -> None:
         """Hand the controls over from this frame on; the MOCM picks up without a step of the controls.
 
+        Whoever it is, lateral stick and pedals fade from what acted into what he gives.
+
         Args:
             mode: ``mocm``, ``external`` (the caller gives commands) or ``hold`` (controls stay where they are).
             command: Controls to hold from now on; None: those that acted last.

@@ -158,7 +158,7 @@ METRICS = (
            lambda s: s.lever.largest - s.lever.least, (FLIGHT, SEARCH), flight="lever.travel", search="lever.travel"),
     Metric("lever_path", "", "distance moved by the lever", lambda s: s.lever.travelled, (SEARCH,),
            search="lever.path"),
-    Metric("controls_on_stop_frames", "", "frames with stick, lever, cyclic or elevator on a stop",
+    Metric("controls_on_stop_frames", "", "frames with a stick, lever, pedals, cyclic or elevator on a stop",
            lambda s: s.stop_frames, (FLIGHT, SEARCH), kind=int),
     Metric("torque_ratio_peak", "", "largest mast torque as a share of its limit", lambda s: s.torque_share, (TRIAL,),
            campaign=("max",)),

