@@ -8,8 +8,8 @@ from typing import Any, Literal, NamedTuple, Protocol, get_args, runtime_checkab
 
 from rtsim.places import Places
 
-UNSAID = 0.0
-"""Default of the lateral channels: 0 from a pilot; from a law, this very object: it says nothing of the channel."""
+UNSAID = float("0")  # an object of its own, which no zero of anybody else is
+"""Default of the lateral channels: 0 from a pilot; a law that leaves it there says nothing of the channel."""
 
 
 @dataclass(frozen=True, slots=True)
