@@ -24,6 +24,8 @@ from rtsim.loop.simulation import FlightSetup, Simulation
 from rtsim.programme import Programme
 from rtsim.protection.limits import LIMIT_KINDS
 from scenarios.files.options import Overrides
+from scenarios.files.trial import pulses_of, trial_problems
+from scenarios.files.trial_schema import PulseTable
 from scenarios.flight.replay import replay_log
 from scenarios.flight.runner import FlightOutputs
 from scenarios.flight.session import FlightSession
@@ -266,3 +268,18 @@ def test_an_aircraft_that_does_not_roll_says_so_once(lateral: int) -> None:
     assert said[0] == said[1]
     assert len(said[0][1]) == (0 if lateral else 1)
     assert all("does not roll or turn" in text for text in said[0][1])
+
+
+@pytest.mark.parametrize(
+    ("channel", "amount", "largest"),
+    [("pedal", 2.5, "-2 to 2 for the pedal"), ("lateral_stick", -3.0, "lateral stick")],
+)
+def test_a_pulse_beyond_both_stops_is_refused(channel: str, amount: float, largest: str) -> None:
+    tables = [
+        PulseTable.model_validate({"channel": channel, "time_s": 0, "duration_s": 1, "amount": value})
+        for value in (2.0, amount)
+    ]
+    problems = trial_problems(tables, None, has_events=False, flight={}, file="x.toml")
+    assert [problem.key for problem in problems] == ["pulses[1].amount"]
+    assert largest in str(problems[0])
+    assert [pulse.amount for pulse in pulses_of(tables)] == [2.0, amount]  # as it is: no angle
