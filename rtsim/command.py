@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Literal, NamedTuple, Protocol, get_args, runtime_checkable
 
 from rtsim.places import Places
+
+UNSAID = float("0")  # an object of its own, which no zero of anybody else is
+"""Default of the lateral channels: 0 from a pilot; a law that leaves it there says nothing of the channel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +22,46 @@ class Command:
     """Power lever, 0 (low collective) to 1 (high collective)."""
     nacelle_rate: float
     """Commanded nacelle rate [rad/s]; negative converts towards airplane mode (0 deg)."""
+    lateral_stick: float = UNSAID
+    """Lateral stick, -1 (left) to 1 (right). A law that does not give it leaves it the pilot's."""
+    pedal: float = UNSAID
+    """Pedals, -1 (left) to 1 (right: nose right). A law that does not give them leaves them the pilot's."""
+
+    @classmethod
+    def given(cls, answer: Any, pilot: Command | None = None) -> Command:
+        """A command of plain numbers from what a user's own code answered.
+
+        Args:
+            answer: Anything with the fields of a command; the lateral ones may be missing.
+            pilot: Whose lateral channels count where the answer does not give them; None: they are 0 then.
+
+        Raises:
+            AttributeError: A field is missing.
+            TypeError: A field is no number.
+            ValueError: The same.
+        """
+        lateral, pedal = (getattr(answer, name, UNSAID) for name in LATERAL_CHANNELS)
+        if pilot is not None:
+            lateral = pilot.lateral_stick if lateral is UNSAID else lateral
+            pedal = pilot.pedal if pedal is UNSAID else pedal
+        return cls(float(answer.stick), float(answer.lever), float(answer.nacelle_rate), float(lateral), float(pedal))
+
+    @property
+    def values(self) -> tuple[float, float, float, float, float]:
+        """The channels in the order of ``CHANNELS``."""
+        return self.stick, self.lever, self.nacelle_rate, self.lateral_stick, self.pedal
+
+    @property
+    def finite(self) -> bool:
+        """Whether every channel is a finite number."""
+        return all(map(math.isfinite, self.values))
+
+
+Channel = Literal["stick", "lever", "nacelle_rate", "lateral_stick", "pedal"]
+CHANNELS: tuple[Channel, ...] = get_args(Channel)
+"""Channels of a command, in its order."""
+LATERAL_CHANNELS = CHANNELS[3:]
+"""Those that move the aircraft out of its plane of symmetry."""
 
 
 class StickInput(NamedTuple):
@@ -32,9 +76,9 @@ class StickInput(NamedTuple):
     lever: float = 0.0
     """Power lever, 0 to 1, absolute."""
     lateral: float = 0.0
-    """Lateral stick, -1 left to 1 right; shown, does not act on the symmetric model."""
+    """Lateral stick, -1 left to 1 right, 0 centre."""
     yaw: float = 0.0
-    """Pedals, -1 left to 1 right; shown, do not act on the symmetric model."""
+    """Pedals, -1 left to 1 right, 0 centre."""
     stick_valid: bool = False
     """Somebody holds the longitudinal stick (a released channel is nobody's)."""
     lever_valid: bool = False
@@ -52,7 +96,19 @@ class StickInput(NamedTuple):
     stream: int = 0
     """When these inputs began, or began anew [ns]; another value means another hand, or one that was away."""
     overridden: int = 0
-    """What a second source of the same hand has taken from the first: 1 the stick, 2 the lever, 4 the nacelle angle."""
+    """What a second source of the same hand has taken from the first: 1 the stick, 2 the lever, 4 the nacelle angle,
+    8 the lateral stick, 16 the pedals."""
+    lateral_valid: bool = False
+    """Somebody holds the lateral stick."""
+    yaw_valid: bool = False
+    """Somebody has the feet on the pedals."""
+    lateral_trim: int = 0
+    """Lateral stick trim: -1 left, 0 let go or both pressed, 1 right."""
+
+    @property
+    def held(self) -> bool:
+        """Somebody holds any of the controls."""
+        return self.stick_valid or self.lever_valid or self.lateral_valid or self.yaw_valid
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +187,7 @@ class Intervention:
 
     limit: str
     """The limit that asked for it, as named in docs/protection.md."""
-    channel: Literal["stick", "lever", "nacelle_rate"]
+    channel: Channel
     """The channel it acted on."""
     kind: Literal["warn", "limit", "reverse", "blend", "clip"]
     """How it acted."""

@@ -137,7 +137,7 @@ SIGNALS: tuple[Signal, ...] = (
         "0 clear, 1 caution, 2 warning, 3 exceedance (after persistence and hysteresis).",
     ),
     Signal("on_downstop", "", "nacelle", "1 while the nacelles rest on the airplane-mode stop."),
-    Signal("control_on_stop", "", "controls", "1 while stick, lever, cyclic or elevator is on a stop."),
+    Signal("control_on_stop", "", "controls", "1 while a stick, lever, pedals, cyclic or elevator is on a stop."),
     Signal("pilot_mode", "", "controls", "Who flies: 0 MOCM, 1 external command, 2 hold."),
     Signal("airspeed_indicated_kt", "kn", "speed", "Airspeed as the sensor shows it to pilot and laws."),
     Signal("gust_u_m_s", "m/s", "air", "Gust added to the air-relative velocity along body x."),
@@ -173,6 +173,19 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("advance_ratio", "", "rotor", "Speed of the air across the rotor disc over tip speed."),
     Signal("weight_on_wheels", "", "altitude", "Force of the ground on the wheels over the weight."),
     Signal("ground_effect", "", "rotor", "Ground effect: 0 far from the ground, 1 hovering on the wheels."),
+    Signal("lateral_stick", "", "controls", "Lateral stick after protection, -1 left to 1 right."),
+    Signal("pedal", "", "controls", "Pedals after protection, -1 left to 1 right."),
+    Signal("pilot_lateral_stick", "", "controls", "Lateral stick as the pilot gave it."),
+    Signal("pilot_pedal", "", "controls", "Pedals as the pilot gave them."),
+    Signal("protection_lateral_stick", "", "protection", "Lateral stick after minus before protection."),
+    Signal("protection_pedal", "", "protection", "Pedals after minus before protection."),
+    Signal(
+        "protection_lateral_stick_reason",
+        "",
+        "protection",
+        "Limit that changed the lateral stick, by the same numbers.",
+    ),
+    Signal("protection_pedal_reason", "", "protection", "Limit that changed the pedals, by the same numbers."),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

@@ -34,6 +34,8 @@ MEMORY = Places(
     "hands_lever",
     "lever_trim",
     ("last_switches", AID_COUNT),
+    "lateral_offset",  # what is left of the last hand-over; NaN: to be found in the coming frame
+    "pedal_offset",
 )
 """Places in the state."""
 MAP = Places(

@@ -24,7 +24,7 @@ STATUS_PERIOD_S = 0.25
 """Time between two status lines [s]."""
 MAX_EVENT_LINES = 40
 """Events told while flying; a flight along a boundary has more than anyone reads."""
-_CONTROLS = (("stick", "stick_s"), ("lever", "lever_s"), ("nacelles", "nacelles_s"))
+_CONTROLS = ("stick", "lever", "nacelles", "lateral stick", "pedals")
 _CORRIDOR_LIMITS = {"stall_attitude", "load_torque", "downstop_gate", "consistency", "time_to_limit"}
 """What the line of the corridor says."""
 _STYLES = {"caution": "yellow", "warning": "bold yellow", "exceedance": "bold red"}
@@ -239,7 +239,8 @@ def _print_metrics(summary: dict[str, Any]) -> None:
     acted = summary.get("interventions", {})
     if acted.get("episodes"):
         times = "acted" if acted["episodes"] == 1 else f"acted {acted['episodes']} times"
-        on = [f"{name} {acted[key]:.1f} s" for name, key in _CONTROLS if acted[key]]
+        seconds = {name: acted[f"{name.replace(' ', '_')}_s"] for name in _CONTROLS}
+        on = [f"{name} {spent:.1f} s" for name, spent in seconds.items() if spent]
         say(f"Protection {times}: {', '.join(on)}")
 
 

@@ -66,6 +66,8 @@ def ask(flight: Flight) -> None:
         pilot[CHANNEL.stick] = state.u[INPUT.stick]
         pilot[CHANNEL.lever] = state.u[INPUT.lever]
         pilot[CHANNEL.nacelle_rate] = 0.0
+        pilot[CHANNEL.lateral_stick] = state.u[INPUT.lateral_stick]
+        pilot[CHANNEL.pedal] = state.u[INPUT.pedal]
     for channel in range(CHANNEL.size):
         command[STATION.hands, channel] = pilot[channel]
 
@@ -95,6 +97,8 @@ def aid(flight: Flight) -> None:
     hands, aided = scratch.command[STATION.hands], scratch.command[STATION.aided]
     hands[CHANNEL.stick] = min(max(hands[CHANNEL.stick], -1.0), 1.0)
     hands[CHANNEL.lever] = min(max(hands[CHANNEL.lever], 0.0), 1.0)
+    _take_over(flight, CHANNEL.lateral_stick, INPUT.lateral_stick, MEMORY.lateral_offset)
+    _take_over(flight, CHANNEL.pedal, INPUT.pedal, MEMORY.pedal_offset)
     if state.clock[CLOCK.mode] != MODE.external:
         # Held controls are what acted last, aids included: a second helping would run them away.
         aided[CHANNEL.stick], aided[CHANNEL.lever] = hands[CHANNEL.stick], hands[CHANNEL.lever]
@@ -110,6 +114,21 @@ def aid(flight: Flight) -> None:
 
 
 @inner_kernel
+def _take_over(flight: Flight, channel: int, place: int, memory: int) -> None:
+    """Pass a lateral channel on; what acted when its pilot took over fades into what this pilot gives."""
+    state, command = flight.state, flight.scratch.command
+    given = min(max(command[STATION.hands, channel], -1.0), 1.0)
+    command[STATION.hands, channel] = given
+    if math.isnan(state.aids[memory]):
+        state.aids[memory] = state.u[place] - given
+    offset = state.aids[memory]
+    if state.clock[CLOCK.mode] == MODE.hold:
+        offset = 0.0
+    command[STATION.aided, channel] = min(max(given + offset, -1.0), 1.0)
+    state.aids[memory] = offset - flight.tables.dt / flight.tables.aids.fade_time * offset
+
+
+@inner_kernel
 def protect(flight: Flight) -> None:
     """Let the compiled law limit ``aided``. Writes ``protected``, and notes what was changed.
 
@@ -121,22 +140,29 @@ def protect(flight: Flight) -> None:
     if law_due(tables.protection, state.protection, int(state.clock[CLOCK.frame])):
         call_at(flight.parts[PART.decide], flight)
     law_apply(tables.protection, state.protection, aided, limited)
+    # No compiled law limits these yet.
+    limited[CHANNEL.lateral_stick], limited[CHANNEL.pedal] = aided[CHANNEL.lateral_stick], aided[CHANNEL.pedal]
     law_state, si = state.protection, scratch.si
-    _note_change(flight, law_state[law.LAW.stick_cause], law_state[law.LAW.lever_cause], law_state[law.LAW.rate_cause])
+    causes = (law_state[law.LAW.stick_cause], law_state[law.LAW.lever_cause], law_state[law.LAW.rate_cause])
+    _note_change(flight, causes, (0.0, 0.0))
     si[QUANTITY.time_to_limit] = law_state[law.LAW.time]
 
 
 @inner_kernel
-def _note_change(flight: Flight, stick_reason: float, lever_reason: float, nacelle_reason: float) -> None:
+def _note_change(flight: Flight, causes: tuple[float, float, float], lateral: tuple[float, float]) -> None:
     """Note what the protection changed, and the limits behind it."""
     si, command = flight.scratch.si, flight.scratch.command
     aided, limited = command[STATION.aided], command[STATION.protected]
     si[QUANTITY.protection_stick] = limited[CHANNEL.stick] - aided[CHANNEL.stick]
     si[QUANTITY.protection_lever] = limited[CHANNEL.lever] - aided[CHANNEL.lever]
     si[QUANTITY.protection_nacelle_rate] = limited[CHANNEL.nacelle_rate] - aided[CHANNEL.nacelle_rate]
-    si[QUANTITY.protection_stick_reason] = stick_reason
-    si[QUANTITY.protection_lever_reason] = lever_reason
-    si[QUANTITY.protection_nacelle_reason] = nacelle_reason
+    si[QUANTITY.protection_lateral_stick] = limited[CHANNEL.lateral_stick] - aided[CHANNEL.lateral_stick]
+    si[QUANTITY.protection_pedal] = limited[CHANNEL.pedal] - aided[CHANNEL.pedal]
+    si[QUANTITY.protection_stick_reason] = causes[0]
+    si[QUANTITY.protection_lever_reason] = causes[1]
+    si[QUANTITY.protection_nacelle_reason] = causes[2]
+    si[QUANTITY.protection_lateral_stick_reason] = lateral[0]
+    si[QUANTITY.protection_pedal_reason] = lateral[1]
 
 
 @inner_kernel
@@ -148,15 +174,17 @@ def hold(flight: Flight) -> None:
     """
     state, scratch = flight.state, flight.scratch
     held = state.held
-    if math.isnan(held[HELD.stick]) and math.isnan(held[HELD.lever]) and math.isnan(held[HELD.nacelle_rate]):
-        return
     if state.protection[law.LAW.override] != 0.0:
         return
     limited = scratch.command[STATION.protected]
+    holds = False
     for channel in range(CHANNEL.size):
         if not math.isnan(held[channel]):
             limited[channel] = held[channel]
-    _note_change(flight, held[HELD.stick_reason], held[HELD.lever_reason], held[HELD.nacelle_reason])
+            holds = True
+    if holds:
+        reasons = held[HELD.reason :]
+        _note_change(flight, (reasons[0], reasons[1], reasons[2]), (reasons[3], reasons[4]))
 
 
 @inner_kernel
@@ -169,6 +197,7 @@ def fail(flight: Flight) -> None:
     tables, state = flight.tables, flight.state
     protected, acting = flight.scratch.command[STATION.protected], flight.scratch.command[STATION.acting]
     acting[CHANNEL.stick], acting[CHANNEL.lever] = protected[CHANNEL.stick], protected[CHANNEL.lever]
+    acting[CHANNEL.lateral_stick], acting[CHANNEL.pedal] = protected[CHANNEL.lateral_stick], protected[CHANNEL.pedal]
     wanted = protected[CHANNEL.nacelle_rate]
     if state.drive[HELD_OFFSET] != 0.0:  # the nacelles stay on the downstop until the rotors are back at full speed
         wanted = min(wanted, 0.0)
@@ -191,13 +220,17 @@ def record(flight: Flight) -> None:
     stick, lever = acting[CHANNEL.stick], acting[CHANNEL.lever]
     cyclic_stop = abs(state.x[STATE.cyclic_1s]) >= controls.cyclic_limit * (1.0 - 1e-9)
     elevator_stop = abs(state.x[STATE.elevator]) >= controls.elevator_limit * (1.0 - 1e-9)
-    stick_stop = abs(stick) >= 1.0
+    stick_stop = abs(stick) >= 1.0 or abs(acting[CHANNEL.lateral_stick]) >= 1.0 or abs(acting[CHANNEL.pedal]) >= 1.0
     lever_stop = lever <= 0.0 or lever >= 1.0
     si[QUANTITY.stick] = stick
     si[QUANTITY.lever] = lever
     si[QUANTITY.pilot_stick] = pilot[CHANNEL.stick]
     si[QUANTITY.pilot_lever] = pilot[CHANNEL.lever]
     si[QUANTITY.pilot_nacelle_rate] = pilot[CHANNEL.nacelle_rate]
+    si[QUANTITY.lateral_stick] = acting[CHANNEL.lateral_stick]
+    si[QUANTITY.pedal] = acting[CHANNEL.pedal]
+    si[QUANTITY.pilot_lateral_stick] = pilot[CHANNEL.lateral_stick]
+    si[QUANTITY.pilot_pedal] = pilot[CHANNEL.pedal]
     si[QUANTITY.nacelle_command_rate] = acting[CHANNEL.nacelle_rate]
     si[QUANTITY.corridor_level] = float(corridor_level_step(tables.corridor, margin, tables.dt, state.level))
     si[QUANTITY.control_on_stop] = 1.0 if stick_stop or lever_stop or cyclic_stop or elevator_stop else 0.0
@@ -236,6 +269,8 @@ def move_plant(flight: Flight) -> None:
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = acting[CHANNEL.stick]
     u[INPUT.lever] = acting[CHANNEL.lever]
+    u[INPUT.lateral_stick] = acting[CHANNEL.lateral_stick]
+    u[INPUT.pedal] = acting[CHANNEL.pedal]
     failing = faults_act(flight)
     if failing:
         call_at(flight.parts[PART.fail], flight)

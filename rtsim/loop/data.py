@@ -9,6 +9,7 @@ from rtsim.aircraft.xv15.tables import Configuration, ControlTables
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.atmosphere.gust_kernels import GustTables
 from rtsim.choices import PilotMode
+from rtsim.command import CHANNELS
 from rtsim.corridor.corridor_kernels import CorridorTables
 from rtsim.faults.fault_kernels import FaultTables
 from rtsim.kernels.packed import Address
@@ -58,9 +59,9 @@ start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""
-CHANNEL = Places("stick", "lever", "nacelle_rate")
-"""Channels of a command: -1 to 1, 0 to 1, [rad/s]."""
-HELD = Places("stick", "lever", "nacelle_rate", "stick_reason", "lever_reason", "nacelle_reason")
+CHANNEL = Places(*CHANNELS)
+"""Channels of a command: -1 to 1, 0 to 1, [rad/s], -1 to 1, -1 to 1."""
+HELD = Places(*CHANNELS, ("reason", len(CHANNELS)))
 """What laws in Python hold until their next decision (NaN: the channel is the pilot's), and the limits behind it."""
 PART = Places(
     "outputs", "step", "ask", "advance", "decide", "aids", "air", "faults", "fail", "automatic_rate",
@@ -82,6 +83,8 @@ class PlantTables(NamedTuple):
     """Mixing, limits, flap schedule."""
     alpha_speed: float
     """Added along the horizon before an angle of attack is recorded, as for scheduling [m/s]."""
+    lateral: int
+    """1: it moves out of its plane of symmetry too; 0: lateral stick and pedals do not act on it."""
 
 
 class ScriptTables(NamedTuple):

@@ -34,6 +34,8 @@ def ask_mocm(flight: Flight) -> float:
     angle = scratch.known[KNOWN.place]
     mocm_output_in(flight.tables.pilot, flight.state.pilot, angle, scratch.target, command, scratch.pilot)
     command[CHANNEL.nacelle_rate] = scratch.target[TARGET.nacelle_rate]
+    # The MOCM's lateral half: none yet, so stick and pedals are let go.
+    command[CHANNEL.lateral_stick] = command[CHANNEL.pedal] = 0.0
     return 0.0
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 
-Channel = Literal["stick", "lever", "switch"]
+Channel = Literal["stick", "lever", "switch", "lateral_stick", "pedal"]
 Shape = Literal["step", "doublet", "sine"]
-CHANNELS: dict[Channel, int] = {"stick": 0, "lever": 1, "switch": 2}
-"""Channels by name, with their number in ``rtsim.loop.script_kernels``."""
+CHANNELS: dict[Channel, int] = {"stick": 0, "lever": 1, "switch": 2, "lateral_stick": 3, "pedal": 4}
+"""Channels by name, with their place in a command."""
 SHAPES: dict[Shape, int] = {"step": 0, "doublet": 1, "sine": 2}
 """Shapes of pulses by name, with their number in ``rtsim.loop.script_kernels``."""
 PULSE_SIZE = 7
@@ -31,13 +31,14 @@ class Pulse:
     duration: float
     """How long it lasts [s]."""
     amount: float
-    """Added to stick (-1 to 1, forward positive) or lever (0 to 1); nacelle rate of the switch [rad/s]."""
+    """Added to stick, lateral stick, pedals (-1 to 1; forward, right positive) or lever (0 to 1); nacelle rate of the
+    switch [rad/s]."""
     shape: Shape = "step"
     """``step``, ``doublet`` (reverses half-way) or ``sine``."""
     period: float = 1.0
     """Period of a ``sine`` [s]."""
     replaces: bool = False
-    """The amount replaces the pilot's own stick or lever instead of being added."""
+    """The amount replaces what the pilot gives instead of being added."""
 
 
 def pulse_table(pulses: Sequence[Pulse]) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Compiled hands of a scripted pilot: pulses on stick, lever and nacelle switch, and a pilot who yields to warnings.
+"""Compiled hands of a scripted pilot: pulses on controls and nacelle switch, and a pilot who yields to warnings.
 
 The built-in pilot flies the programme; the script changes what it asks for. From the first use of the nacelle switch on
 the programme's nacelle motion is over: whoever has the switch in his hand moves the nacelles himself.
@@ -17,12 +17,13 @@ from rtsim.units import KNOT
 
 WARNING_MARGIN = 4.0 * KNOT
 """Corridor margin at which the monitor warns and a pilot who yields begins to react [m/s]."""
-CHANNEL_STICK, CHANNEL_LEVER, CHANNEL_SWITCH = 0, 1, 2
+CHANNEL_SWITCH = 2
+"""Place of the nacelle rate in a command; pulses move the other places as they are."""
 SHAPE_STEP, SHAPE_DOUBLET, SHAPE_SINE = 0, 1, 2
 
 # Places in a row of pulses.
 P_CHANNEL, P_START, P_END, P_AMOUNT, P_SHAPE, P_PERIOD, P_SET = 0, 1, 2, 3, 4, 5, 6
-"""P_AMOUNT: added to stick or lever, or the nacelle rate [rad/s]; P_SET 1: it replaces what the pilot gives."""
+"""P_AMOUNT: added to the control, or the nacelle rate [rad/s]; P_SET 1: it replaces what the pilot gives."""
 
 # Places in the script's state.
 S_WARNED_SINCE, S_YIELDED, S_SWITCHED, S_HELD_AIRSPEED = 0, 1, 2, 3
@@ -48,7 +49,8 @@ def script_command(pulses: FloatArray, state: FloatArray, time: float, command: 
         pulses: The script, shape (pulses, PULSE_SIZE).
         state: Script state; notes the first use of the switch.
         time: Time at the start of the frame [s].
-        command: Stick, lever, nacelle rate [rad/s]; changed in place, limited to the travel of the controls.
+        command: Stick, lever, nacelle rate [rad/s], lateral stick, pedals; changed in place, limited to the travel of
+            the controls.
     """
     if state[S_YIELDED] != 0.0:
         command[2] = 0.0
@@ -76,6 +78,8 @@ def script_command(pulses: FloatArray, state: FloatArray, time: float, command: 
             command[channel] += amount
     command[0] = min(max(command[0], -1.0), 1.0)
     command[1] = min(max(command[1], 0.0), 1.0)
+    command[3] = min(max(command[3], -1.0), 1.0)
+    command[4] = min(max(command[4], -1.0), 1.0)
     if state[S_SWITCHED] != 0.0:
         command[2] = pressed
 
@@ -90,6 +94,8 @@ def warns(shown: FloatArray, row: FloatArray) -> bool:
     warned = min(shown[1], shown[2]) < WARNING_MARGIN
     warned = warned or row[COLUMN.protection_stick_reason] != 0.0
     warned = warned or row[COLUMN.protection_lever_reason] != 0.0
+    warned = warned or row[COLUMN.protection_lateral_stick_reason] != 0.0
+    warned = warned or row[COLUMN.protection_pedal_reason] != 0.0
     return warned or row[COLUMN.protection_nacelle_reason] != 0.0
 
 

@@ -242,6 +242,7 @@ def build_parts(setup: FlightSetup) -> Parts:
             configuration=own.configuration,
             controls=control_tables(profile),
             alpha_speed=scheduling_speed(database),
+            lateral=0,
         ),
         nacelle=load_nacelle_tables(profile),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
@@ -373,7 +374,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     u = parts.start_u.copy()
     u[[place for place in range(len(ALL_INPUTS)) if place not in of_role(ALL_INPUTS, "pilot")]] = 0.0
     held = np.full(HELD.size, np.nan)
-    held[HELD.stick_reason :] = 0.0
+    held[HELD.reason :] = 0.0
     state = SimulationState(
         x=parts.start_x.copy(),
         u=u,

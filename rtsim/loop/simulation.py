@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.aids.aids_kernels import MEMORY
 from rtsim.aids.design import SWITCHES, switch_of
 from rtsim.aircraft.variables import INPUT
 from rtsim.arguments import instance, whole_number
@@ -199,7 +200,7 @@ class Simulation:
         row: FloatArray = np.empty(SIGNAL_COUNT)
         for key, given in (("command", command), ("applied", applied)):
             if given is not None and type(given) is not Command:
-                instance(given, Command, key, "give Command(stick, lever, nacelle_rate)")
+                instance(given, Command, key, "give Command(stick, lever, nacelle_rate, lateral_stick, pedal)")
         if command is None and applied is None:
             self._fly(row, 1, WHOLE)
             return row
@@ -240,6 +241,8 @@ class Simulation:
     def set_pilot(self, mode: PilotMode, *, command: Command | None = None) -> None:
         """Hand the controls over from this frame on; the MOCM picks up without a step of the controls.
 
+        Whoever it is, lateral stick and pedals fade from what acted into what he gives.
+
         Args:
             mode: ``mocm``, ``external`` (the caller gives commands) or ``hold`` (controls stay where they are).
             command: Controls to hold from now on; None: those that acted last.
@@ -248,11 +251,13 @@ class Simulation:
             mend = suggestion(str(mode), MODES, otherwise="choose one")
             raise InputError("is no mode of the pilot", key="mode", value=mode, allowed=", ".join(MODES), mend=mend)
         if command is not None:
-            self._state.u[INPUT.stick], self._state.u[INPUT.lever] = command.stick, command.lever
+            hands = (command.stick, command.lever, command.lateral_stick, command.pedal)
+            self._state.u[[INPUT.stick, INPUT.lever, INPUT.lateral_stick, INPUT.pedal]] = hands
         if mode == "mocm" and self.mode != "mocm":
             self.flying.engage()
             self._observed = True
         self._state.clock[CLOCK.mode] = MODES[mode]
+        self._state.aids[[MEMORY.lateral_offset, MEMORY.pedal_offset]] = math.nan  # no step, whoever takes over
         self._observed = False
 
     @property
@@ -458,14 +463,14 @@ def fly_with_laws(flying: Flying, laws: LawChain, rows: FloatArray, frames: int,
     return flown
 
 
-def _numbers(command: Command) -> tuple[float, float, float]:
+def _numbers(command: Command) -> tuple[float, ...]:
     """The channels of a command that came from outside."""
-    values = (float(command.stick), float(command.lever), float(command.nacelle_rate))
-    if not all(map(math.isfinite, values)):
+    given = Command.given(command)
+    if not given.finite:
         raise InputError(
             "the command is not a finite number",
             key="command",
-            value=values,
-            mend="give stick, lever and nacelle rate as finite numbers",
+            value=given.values,
+            mend="give every channel as a finite number",
         )
-    return values
+    return given.values

@@ -158,7 +158,7 @@ METRICS = (
            lambda s: s.lever.largest - s.lever.least, (FLIGHT, SEARCH), flight="lever.travel", search="lever.travel"),
     Metric("lever_path", "", "distance moved by the lever", lambda s: s.lever.travelled, (SEARCH,),
            search="lever.path"),
-    Metric("controls_on_stop_frames", "", "frames with stick, lever, cyclic or elevator on a stop",
+    Metric("controls_on_stop_frames", "", "frames with a stick, lever, pedals, cyclic or elevator on a stop",
            lambda s: s.stop_frames, (FLIGHT, SEARCH), kind=int),
     Metric("torque_ratio_peak", "", "largest mast torque as a share of its limit", lambda s: s.torque_share, (TRIAL,),
            campaign=("max",)),
@@ -326,6 +326,8 @@ def _law_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> None
         row[COLUMN.protection_stick_reason],
         row[COLUMN.protection_lever_reason],
         row[COLUMN.protection_nacelle_reason],
+        row[COLUMN.protection_lateral_stick_reason],
+        row[COLUMN.protection_pedal_reason],
     ):
         if reason in (law.REASON_LOW, law.REASON_HIGH, law.REASON_GATE):
             corridor = True

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from rtsim.aircraft.profile import AircraftProfile
-from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.command import CHANNELS, Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.errors import InputError
 from rtsim.guests import words_of
 from rtsim.protection.guard import Failure, GuardedAnswer, guarded_call
-from rtsim.protection.laws import CHANNELS, LawSpec
+from rtsim.protection.laws import LawSpec
 from rtsim.protection.limits import LIMIT_KINDS, frames_per_decision
 
 BATCH_LIMIT = 1.0
@@ -26,8 +26,9 @@ LIVE_LIMIT = 0.25
 """Time on the clock after which it is in a live flight, where the loop waits meanwhile [s]."""
 OTHER_REASON = float(len(LIMIT_KINDS) + 1)
 """Recorded reason of an intervention whose limit is none of ``LIMIT_KINDS``."""
-RANGES = ((-1.0, 1.0), (0.0, 1.0), (-math.inf, math.inf))
-"""What stick, lever and nacelle rate can be; the nacelles' own rate limits act later."""
+RANGES = ((-1.0, 1.0), (0.0, 1.0), (-math.inf, math.inf), (-1.0, 1.0), (-1.0, 1.0))
+"""What the channels can be; the nacelles' own rate limits act later."""
+_NO_REASONS = (0.0,) * len(CHANNELS)
 EventKind = Literal["raised", "not_finite", "wrong_answer", "interrupted", "skipped", "global_state", "out_of_range"]
 
 
@@ -121,14 +122,14 @@ class LawChain:
         self.interventions: tuple[ChainedIntervention, ...] = ()
         """What the laws say they did in the last decision."""
         self.live, self.on_event, self.remember = live, on_event, remember
-        self.reasons: tuple[float, ...] = (0.0, 0.0, 0.0)
-        """Number of the limit that changed stick, lever and nacelle rate; ``OTHER_REASON`` for a law's own limits."""
+        self.reasons: tuple[float, ...] = _NO_REASONS
+        """Number of the limit that changed each channel; ``OTHER_REASON`` for a law's own limits."""
         self._specs = tuple(laws)
         self._laws: list[ProtectionLaw | None] = []
         self._waiting: list[int] = []
         self._calls: list[list[_Call]] = []
         self._clipped: list[bool] = []
-        self._held: list[float | None] = [None, None, None]
+        self._held: list[float | None] = [None] * len(CHANNELS)
         self.reset()
 
     def reset(self) -> None:
@@ -137,8 +138,8 @@ class LawChain:
         self._waiting = [0] * len(self._specs)
         self._calls = [[] for _ in self._specs]
         self._clipped = [False] * len(self._specs)
-        self._held = [None, None, None]
-        self.interventions, self.reasons = (), (0.0, 0.0, 0.0)
+        self._held = [None] * len(CHANNELS)
+        self.interventions, self.reasons = (), _NO_REASONS
 
     def snapshot(self) -> ChainSnapshot:
         """Copy all state.
@@ -222,7 +223,7 @@ class LawChain:
             limited = answer.command
             noted += [ChainedIntervention(frame, spec.name, item) for item in answer.interventions]
         self.interventions = tuple(noted)
-        pairs = zip(_values(command), _values(limited), strict=True)
+        pairs = zip(command.values, limited.values, strict=True)
         self._held = [None if after == before else after for before, after in pairs]
         self.reasons = tuple(
             _reason(channel, noted) if held is not None else 0.0
@@ -293,14 +294,19 @@ class LawChain:
 
     def _in_range(self, frame: int, place: int, answer: GuardedAnswer, command: Command) -> GuardedAnswer:
         """Clip what no control can do, and say so once in a flight."""
-        given = _values(command)
+        given = command.values
         clipped = tuple(min(max(value, low), high) for value, (low, high) in zip(given, RANGES, strict=True))
         if clipped == given:
             return answer
         if not self._clipped[place]:
             self._clipped[place] = True
             name = self._specs[place].name
-            text = f"the law {name} asks for stick {given[0]:g} and lever {given[1]:g}; clipped to -1 to 1 and 0 to 1"
+            beyond = [
+                item for item in zip(CHANNELS, given, RANGES, strict=True) if not item[2][0] <= item[1] <= item[2][1]
+            ]
+            asked = " and ".join(f"{channel.replace('_', ' ')} {value:g}" for channel, value, _ in beyond)
+            ranges = " and ".join(f"{low:g} to {high:g}" for *_, (low, high) in beyond)
+            text = f"the law {name} asks for {asked}; clipped to {ranges}"
             self._tell(LawEvent(frame, name, "out_of_range", text, False))
         return replace(answer, command=Command(*clipped))
 
@@ -320,10 +326,6 @@ def _reason(channel: str, noted: Sequence[ChainedIntervention]) -> float:
     if not limits or limits[-1] not in LIMIT_KINDS:
         return OTHER_REASON
     return 1.0 + LIMIT_KINDS.index(limits[-1])
-
-
-def _values(command: Command) -> tuple[float, float, float]:
-    return command.stick, command.lever, command.nacelle_rate
 
 
 def compiled_law(laws: Sequence[LawSpec]) -> str | None:

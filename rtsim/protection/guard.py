@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import signal
 import sys
 import threading
@@ -14,10 +13,9 @@ from operator import attrgetter
 from types import FrameType
 from typing import Any, Literal, Self, TypeVar, cast
 
-from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.command import CHANNELS, Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.errors import Terminated
 from rtsim.guests import Visit, shown, words_of
-from rtsim.protection.laws import CHANNELS
 
 TraceFunction = Callable[[FrameType, str, Any], Any]
 
@@ -168,7 +166,7 @@ def guarded_call(
         failure, text = "wrong_answer", "changed what it was given; its command must be a new one"
     if failure is not None:
         return GuardedAnswer(None, (), failure, text, duration)
-    return _checked(answer, duration)
+    return _checked(answer, command, duration)
 
 
 def _copy(values: Values) -> Values:
@@ -177,10 +175,10 @@ def _copy(values: Values) -> Values:
     return kind(*_FIELDS[kind](values))
 
 
-def _checked(answer: object, duration: float) -> GuardedAnswer:
+def _checked(answer: object, pilot: Command, duration: float) -> GuardedAnswer:
     try:
         limited, interventions = cast("tuple[Command, list[Intervention]]", answer)
-        command = Command(float(limited.stick), float(limited.lever), float(limited.nacelle_rate))
+        command = Command.given(limited, pilot)
         listed = tuple(interventions)
     except (TypeError, ValueError, AttributeError):
         said = shown(answer)
@@ -191,7 +189,7 @@ def _checked(answer: object, duration: float) -> GuardedAnswer:
         odd = _odd_intervention(item)
         if odd:
             return GuardedAnswer(None, (), "wrong_answer", f"gave a list of interventions that holds {odd}", duration)
-    if not math.isfinite(command.stick + command.lever + command.nacelle_rate):
+    if not command.finite:
         return GuardedAnswer(None, (), "not_finite", f"gave a command that is not finite: {command}", duration)
     return GuardedAnswer(command, listed, None, "", duration)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rtsim.aircraft.condition import AircraftName
 from rtsim.choices import CorridorName
-from rtsim.command import Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.command import CHANNELS, Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
@@ -32,8 +32,6 @@ LAW_PLUGIN = PluginKind(
     page="docs/protection.md",
 )
 """A protection law as plug-in."""
-CHANNELS: tuple[Literal["stick", "lever", "nacelle_rate"], ...] = ("stick", "lever", "nacelle_rate")
-"""What a law may change, in the order of a command."""
 _CLIPS = (data.REASON_FLAP, data.REASON_PITCH, data.REASON_TORQUE)
 _WARNING_TIME = 5.0
 
@@ -109,7 +107,7 @@ class BuiltInLaw:
         law_kernels.protect(self._tables, self._state, self._frame, known, asked, self._applied, self._work)
         self._frame += 1
         stick, lever, rate = (float(value) for value in self._applied)
-        return Command(stick, lever, rate), self._interventions(sensors, asked)
+        return Command(stick, lever, rate, command.lateral_stick, command.pedal), self._interventions(sensors, asked)
 
     def _interventions(self, sensors: Sensors, asked: np.ndarray[tuple[int], Any]) -> list[Intervention]:
         state = self._state
@@ -117,7 +115,7 @@ class BuiltInLaw:
             return self._warnings(asked)
         found = []
         causes = (data.LAW.stick_cause, data.LAW.lever_cause, data.LAW.rate_cause)
-        for place, (channel, cause) in enumerate(zip(CHANNELS, causes, strict=True)):
+        for place, (channel, cause) in enumerate(zip(CHANNELS[:3], causes, strict=True)):
             reason = int(state[cause])
             if reason == data.REASON_NONE:
                 continue

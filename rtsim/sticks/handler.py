@@ -146,7 +146,7 @@ class _Control:
 
 
 class StickHandler:
-    """One person's hands on stick, lever and nacelle switch."""
+    """One person's hands on stick, lever and nacelle switch, and the feet on the pedals."""
 
     def __init__(
         self,
@@ -176,11 +176,15 @@ class StickHandler:
         """Conversion by command under way: 0 none, TO_HELICOPTER, TO_AIRPLANE."""
         self.trim = 0.0
         """Offset set by the trim buttons [half travels]."""
+        self.lateral_trim = 0.0
+        """The same of the lateral stick."""
         self._stick = _Control(start.stick, STICK_FADE_RATE)
         self._lever = _Control(start.lever, LEVER_FADE_RATE)
+        self._lateral = _Control(start.lateral_stick, STICK_FADE_RATE)
+        self._pedal = _Control(start.pedal, STICK_FADE_RATE)
         self._stream = 0
         self._target = math.nan
-        self._stick_owner: int | None = None
+        self._owners: dict[int, int] = {}
         self._axis_angles: dict[tuple[int, int], float] = {}
         self.change(settings)
         # The kernels load now, not in a frame.
@@ -198,9 +202,20 @@ class StickHandler:
         return self._lever.value
 
     @property
+    def lateral_stick(self) -> float:
+        """Lateral stick of the last frame."""
+        return self._lateral.value
+
+    @property
+    def pedal(self) -> float:
+        """Pedals of the last frame."""
+        return self._pedal.value
+
+    @property
     def waiting(self) -> int:
-        """Controls whose hand is elsewhere and has not taken them yet: 1 the stick, 2 the lever."""
-        return int(self._stick.waits) | int(self._lever.waits) << 1
+        """Controls whose hand is elsewhere and has not taken them yet: 1 stick, 2 lever, 4 lateral stick, 8 pedals."""
+        controls = (self._stick, self._lever, self._lateral, self._pedal)
+        return sum(control.waits << bit for bit, control in enumerate(controls))
 
     def change(self, settings: StickSettings) -> None:
         """Take other settings from the next frame on.
@@ -218,22 +233,22 @@ class StickHandler:
     def engage(self, acting: Command) -> None:
         """Take the controls over from another pilot.
 
-        The lever stays as it is and the stick is at its trim until the hands take them; what then differs from the
-        acting controls is faded by the pilot aids.
+        The lever stays as it is, stick and pedals are at their trim until the hands take them; what then differs from
+        the acting controls fades in the flight.
 
         Args:
             acting: Controls that acted last.
         """
         self._lever = _Control(acting.lever, LEVER_FADE_RATE)
-        self._stick = _Control(0.0, STICK_FADE_RATE)
+        self._stick, self._lateral, self._pedal = (_Control(0.0, STICK_FADE_RATE) for _ in range(3))
         self._stream = 0
         self._stop_nacelles()  # what was asked of them before another pilot flew is over
         self.state = INPUT_NONE if self.state == INPUT_NONE else INPUT_LIVE
 
     def go_on(self) -> None:
         """The flight goes on after it stood still: what the hands moved meanwhile fades in."""
-        self._stick.blend()
-        self._lever.blend()
+        for control in (self._stick, self._lever, self._lateral, self._pedal):
+            control.blend()
 
     def go_to(self, angle: float) -> None:
         """Send the nacelles to an angle at the switch's rate.
@@ -270,26 +285,43 @@ class StickHandler:
         settings = self.settings
         fresh = sticks.sequence > 0 and age <= settings.loss_time
         stick_held, lever_held = fresh and sticks.stick_valid, fresh and sticks.lever_valid
-        self._follow_state(held=stick_held or lever_held)
+        lateral_held, pedal_held = fresh and sticks.lateral_valid, fresh and sticks.yaw_valid
+        self._follow_state(held=fresh and sticks.held)
         stream = max(sticks.stream, 1) if fresh else 0
         goes_on, self._stream = stream == self._stream, stream
         if stick_held and sticks.trim:
-            moved = self.trim + sticks.trim * settings.trim_rate * dt
-            self.trim = min(max(moved, -LARGEST_TRIM), LARGEST_TRIM)
+            self.trim = self._trimmed(self.trim, sticks.trim, dt)
+        if lateral_held and sticks.lateral_trim:
+            self.lateral_trim = self._trimmed(self.lateral_trim, sticks.lateral_trim, dt)
 
-        place = shaped(settings, sticks.stick)
-        # A stick that its owner never had, and that appears among inputs that go on, comes from its centre.
-        before = 0.0 if goes_on and not self._stick.held and self._stick_owner != sticks.owner else place
-        if stick_held:
-            self._stick_owner = sticks.owner
-        hand = _Hand(place, (stream, sticks.overridden & 1), before) if stick_held else None
+        hand = self._sprung(sticks, self._stick, sticks.stick, bit=1, held=stick_held, goes_on=goes_on)
         stick = self._stick.step(hand, dt, settings=settings, rest=situation.trim_stick, trim=self.trim)
+        hand = self._sprung(sticks, self._lateral, sticks.lateral, bit=8, held=lateral_held, goes_on=goes_on)
+        lateral = self._lateral.step(hand, dt, settings=settings, rest=0.0, trim=self.lateral_trim)
+        hand = self._sprung(sticks, self._pedal, sticks.yaw, bit=16, held=pedal_held, goes_on=goes_on)
+        pedal = self._pedal.step(hand, dt, settings=settings, rest=0.0, trim=0.0)
         place = min(max(sticks.lever, 0.0), 1.0)
         hand = _Hand(place, (stream, sticks.overridden & 2), place) if lever_held else None
         lever = self._lever.step(hand, dt, settings=settings, rest=None, trim=0.0)
 
         rate = self._nacelle_rate(sticks, fresh=fresh, goes_on=goes_on, situation=situation, dt=dt)
-        return Command(stick, lever, rate)
+        return Command(stick, lever, rate, lateral, pedal)
+
+    def _trimmed(self, trim: float, direction: int, dt: float) -> float:
+        """A trim after a frame with its button held."""
+        return min(max(trim + direction * self.settings.trim_rate * dt, -LARGEST_TRIM), LARGEST_TRIM)
+
+    def _sprung(
+        self, sticks: StickInput, control: _Control, deflection: float, *, bit: int, held: bool, goes_on: bool
+    ) -> _Hand | None:
+        """The hand on a control that springs back to its centre, by its bit in ``StickInput.overridden``."""
+        if not held:
+            return None
+        place = shaped(self.settings, deflection)
+        # A stick that its owner never had, and that appears among inputs that go on, comes from its centre.
+        before = 0.0 if goes_on and not control.held and self._owners.get(bit) != sticks.owner else place
+        self._owners[bit] = sticks.owner
+        return _Hand(place, (self._stream, sticks.overridden & bit), before)
 
     def _follow_state(self, *, held: bool) -> None:
         if held:

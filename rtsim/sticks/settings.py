@@ -18,7 +18,7 @@ class StickSettings:
     expo: float = 0.0
     """0 straight, 1 cubic: softer around the centre, full travel unchanged."""
     scale: float = 1.0
-    """Stick at full deflection, as a part of half travel."""
+    """Stick and pedals at full deflection, as a part of half travel."""
     detents: bool = False
     """Nacelle switch: True runs to detents (the paper's), False moves while held."""
     nacelle_rate: float = deg(7.5)
@@ -28,7 +28,7 @@ class StickSettings:
     blend_time: float = 0.2
     """Time in which the controls pass to sticks that are back [s]."""
     ramp_time: float = 0.3
-    """Time in which the stick goes to trim when it is lost [s]."""
+    """Time in which stick and pedals go to trim when they are lost [s]."""
     trim_rate: float = 0.1
     """Rate of the trim buttons [half travels/s]."""
 

@@ -19,7 +19,7 @@ from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
 from scenarios.files.expectation import name_problems
-from scenarios.files.trial import LARGEST_LEVER, LARGEST_STICK
+from scenarios.files.trial import LARGEST_PULSES
 
 Generator = np.random.Generator
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -107,7 +107,7 @@ class NacelleDraw(Strict):
 class PulseDraw(Strict):
     """One of ``pulses``: movements of a control, one after the other."""
 
-    channel: Literal["stick", "lever", "switch"]
+    channel: Literal["stick", "lever", "switch", "lateral_stick", "pedal"]
     count: Number = 1.0
     time_s: Number = 2.0
     duration_s: Number
@@ -332,7 +332,7 @@ def _number_problems(
         value, place = getattr(table, name), f"{key}.{name}"
         allowed = RANGES.get(name)
         if isinstance(table, PulseDraw) and name == "amount":
-            largest = {"stick": LARGEST_STICK, "lever": LARGEST_LEVER}.get(table.channel, LARGEST_SWITCH_DEG_S)
+            largest = LARGEST_PULSES.get(table.channel, LARGEST_SWITCH_DEG_S)
             allowed = (-largest, largest)
         if isinstance(value, BaseModel):
             found += _number_problems(value, place, file, limits=allowed)

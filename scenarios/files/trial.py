@@ -13,7 +13,7 @@ from scenarios.files.expectation import Expectation, name_problems, range_proble
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
 TrialKind = Literal["nominal", "misuse", "failure", "unprotectable"]
-LARGEST_STICK, LARGEST_LEVER = 2.0, 1.0
+LARGEST_PULSES = {"stick": 2.0, "lever": 1.0, "lateral_stick": 2.0, "pedal": 2.0}
 """Largest amounts that mean something: from stop to stop."""
 
 
@@ -58,7 +58,7 @@ def trial_problems(
 def _pulse_problems(pulses: Sequence[PulseTable], file: str) -> list[InputError]:
     found = []
     for number, pulse in enumerate(pulses):
-        largest = {"stick": LARGEST_STICK, "lever": LARGEST_LEVER}.get(pulse.channel, 12.0)
+        largest = LARGEST_PULSES.get(pulse.channel, 12.0)
         if abs(pulse.amount) > largest:
             found.append(
                 InputError(
@@ -66,7 +66,7 @@ def _pulse_problems(pulses: Sequence[PulseTable], file: str) -> list[InputError]
                     file=file,
                     key=f"pulses[{number}].amount",
                     value=pulse.amount,
-                    allowed=f"-{largest:g} to {largest:g} for the {pulse.channel}",
+                    allowed=f"-{largest:g} to {largest:g} for the {pulse.channel.replace('_', ' ')}",
                 )
             )
         if pulse.replaces and pulse.channel == "switch":

@@ -14,7 +14,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 class PulseTable(Strict):
     """One of ``[[pulses]]``: what a hand does to a control besides the pilot."""
 
-    channel: Literal["stick", "lever", "switch"]
+    channel: Literal["stick", "lever", "switch", "lateral_stick", "pedal"]
     time_s: Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
     duration_s: Annotated[float, Field(gt=0.0, le=36_000.0, allow_inf_nan=False)]
     amount: Annotated[float, Field(ge=-12.0, le=12.0, allow_inf_nan=False)]

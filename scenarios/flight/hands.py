@@ -105,7 +105,7 @@ class Hands:
         sticks, age = self._link.input.read(), self._link.input.age()
         fresh = sticks.sequence > 0 and age <= self._settings.loss_time
         simulation = flight.simulation
-        if self._waiting and fresh and (sticks.stick_valid or sticks.lever_valid):
+        if self._waiting and fresh and sticks.held:
             self._waiting = False
             if not _flies(flight):
                 flight.switch_pilot("external", by_hand=True)
@@ -121,8 +121,8 @@ class Hands:
             Feedback(
                 handler.stick,
                 handler.lever,
-                sticks.lateral if fresh else 0.0,
-                sticks.yaw if fresh else 0.0,
+                handler.lateral_stick,
+                handler.pedal,
                 float(handler.nacelle_switch),
                 self._angle,
                 float(state),

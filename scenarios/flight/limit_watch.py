@@ -32,6 +32,8 @@ _CHANNELS = (
     ("stick", COLUMN.protection_stick_reason),
     ("lever", COLUMN.protection_lever_reason),
     ("nacelles", COLUMN.protection_nacelle_reason),
+    ("lateral stick", COLUMN.protection_lateral_stick_reason),
+    ("pedals", COLUMN.protection_pedal_reason),
 )
 
 
@@ -56,11 +58,11 @@ class LimitWatch:
         self._fill = 0
         self._frame = -1
         self._told = np.zeros(KIND.size)
-        self._reasons: list[set[int]] = [{0}, {0}, {0}]  # of this episode, by channel; told once each
+        self._reasons: list[set[int]] = [{0} for _ in _CHANNELS]  # of this episode, by channel; told once each
         self._began: int | None = None  # frame in which a law began to act; None: none acts
         self._acted = 0  # last frame in which it did
         self._episodes = 0
-        self._active_frames = [0, 0, 0]
+        self._active_frames = [0] * len(_CHANNELS)
 
     def row(self, row: FloatArray) -> None:
         """Take one row of a paced flight.
@@ -98,7 +100,8 @@ class LimitWatch:
         """Least margins and what the law did, as ``rtsim fly --json`` prints them."""
         self.flush()
         seconds = {
-            f"{name}_s": frames * self._dt for (name, _), frames in zip(_CHANNELS, self._active_frames, strict=True)
+            f"{name.replace(' ', '_')}_s": frames * self._dt
+            for (name, _), frames in zip(_CHANNELS, self._active_frames, strict=True)
         }
         return {"limits": self._levels.summary(), "interventions": {"episodes": self._episodes, **seconds}}
 
@@ -106,7 +109,7 @@ class LimitWatch:
         """A reset begins a new flight, whose levels are all clear."""
         self._levels.reset()
         self._told[:] = 0.0
-        self._reasons = [{0}, {0}, {0}]
+        self._reasons = [{0} for _ in _CHANNELS]
         self._began = None
 
     def _watch_limits(self, rows: FloatArray) -> None:
@@ -146,7 +149,7 @@ class LimitWatch:
         acting = reasons != 0.0
         if self._began is None and not acting.any():
             return
-        for place in range(3):
+        for place in range(len(_CHANNELS)):
             self._active_frames[place] += int(np.count_nonzero(acting[:, place]))
         # Only frames at which something changes, and the last, are looked at one by one.
         change = np.any(reasons[1:] != reasons[:-1], axis=1)
@@ -163,7 +166,7 @@ class LimitWatch:
                 self._episodes += 1
             self._acted = frame
             # Limits at their edge come and go: each is told once.
-            news = [place for place in range(3) if reasons[place] not in self._reasons[place]]
+            news = [place for place in range(len(_CHANNELS)) if reasons[place] not in self._reasons[place]]
             for place in news:
                 self._reasons[place].add(reasons[place])
                 name = _CHANNELS[place][0]
@@ -176,7 +179,7 @@ class LimitWatch:
         frame = self._acted + round(LET_GO_S / self._dt)
         text = f"protection has let go after {seconds:.1f} s"
         self._noted.append(LogEvent(frame, frame * self._dt, "protection", text, "info", {"seconds": seconds}))
-        self._reasons = [{0}, {0}, {0}]
+        self._reasons = [{0} for _ in _CHANNELS]
         self._began = None
 
     def _say(self, row: FloatArray, kind: str, text: str, level: str, data: dict[str, Any]) -> None:

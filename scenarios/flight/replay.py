@@ -131,6 +131,8 @@ def fly_recording(simulation: Simulation, recorded: FloatArray, events: Sequence
             float(recorded[row, COLUMN.pilot_stick]),
             float(recorded[row, COLUMN.pilot_lever]),
             float(recorded[row, COLUMN.pilot_nacelle_rate_rad_s]),
+            float(recorded[row, COLUMN.pilot_lateral_stick]),
+            float(recorded[row, COLUMN.pilot_pedal]),
         )
         replayed[row] = simulation.step(command)
     return replayed

@@ -14,7 +14,7 @@ from rtsim.choices import PilotMode
 from rtsim.command import Command, Pilot
 from rtsim.errors import InputError
 from rtsim.faults.fault import fault_events
-from rtsim.frame import SIGNAL_COUNT
+from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.guests import GuestError, visited
 from rtsim.loop.data import END
 from rtsim.loop.simulation import END_REASONS, Disturbance, Simulation
@@ -38,6 +38,9 @@ HAND_WORDS = "your sticks fly"
 GENTLE_END = END_REASONS[END.gentle_landing].split(",", maxsplit=1)[0]
 """How the end reason of a gentle landing begins."""
 
+SIDEWAYS_FROM = 0.05
+"""Lateral stick or pedal from which it is said that it does not act, where it does not."""
+_LATERAL, _PEDAL = COLUMN.pilot_lateral_stick, COLUMN.pilot_pedal
 ROOM_FRAMES = 65_536
 """Rows of an unpaced flight that lie together in memory, at most."""
 
@@ -92,6 +95,7 @@ class FlightSession:
         self.by_hand = hands is not None and pilot_factory is None
         """Whether the mode ``external`` means the sticks of a person, not the plug-in."""
         self._in_block: tuple[int, int] | None = None
+        self._symmetric = simulation.tables.plant.lateral == 0  # and that is still to be said
         self._room = np.empty((0, SIGNAL_COUNT))  # what the next blocks are written to
 
     @property
@@ -141,6 +145,8 @@ class FlightSession:
             command = self._tilt(self._nacelle_law, command)
         row = simulation.step(command, scripted=scripted)
         self.rows += 1
+        if self._symmetric and max(abs(row.item(_LATERAL)), abs(row.item(_PEDAL))) > SIDEWAYS_FROM:
+            self._say_symmetric()
         if hands is not None:
             hands.after(row, simulation.dt)
         return row
@@ -173,6 +179,8 @@ class FlightSession:
             self._room = self._room[len(rows) :]
             self._in_block = None
             self.rows += len(rows)
+            if self._symmetric and np.abs(rows[:, (_LATERAL, _PEDAL)]).max(initial=0.0) > SIDEWAYS_FROM:
+                self._say_symmetric()
             return rows
         rows = np.empty((frames, SIGNAL_COUNT))
         flown = 0
@@ -333,16 +341,22 @@ class FlightSession:
             self._next_due += 1
             self.switch_pilot(event.pilot)
 
+    def _say_symmetric(self) -> None:
+        """Say once that this aircraft does not answer to lateral stick and pedals."""
+        self._symmetric = False
+        text = "this aircraft does not roll or turn: lateral stick and pedals do not act"
+        self._tell("advice", text, level="warning")
+
     def _ask_pilot(self, pilot: Pilot) -> Command | None:
         """The plug-in's command; where it fails, the flight ends with the controls held for one last frame."""
         simulation = self.simulation
         try:
             answer = visited(pilot.step, simulation.sensors(), simulation.reference(), simulation.dt)
-            command = visited(_as_command, answer)
+            command = visited(Command.given, answer)
         except GuestError as error:
             problem = f"raised {error}"
         else:
-            if math.isfinite(command.stick + command.lever + command.nacelle_rate):
+            if command.finite:
                 return command
             problem = f"gave a command that is not finite: {command}"
         self._failure = f"the pilot {self._pilot_name} {problem}"
@@ -364,7 +378,3 @@ class FlightSession:
             time = self.simulation.frame_index * self.dt
             details = {"row": self.rows, **(data or {})}
             self.on_event(LogEvent(self.simulation.frame_index, time, kind, text, level, details))
-
-
-def _as_command(answer: Any) -> Command:
-    return Command(float(answer.stick), float(answer.lever), float(answer.nacelle_rate))

@@ -29,6 +29,8 @@ _CHANNELS = (
     ("stick", COLUMN.protection_stick_reason),
     ("lever", COLUMN.protection_lever_reason),
     ("nacelle", COLUMN.protection_nacelle_reason),
+    ("lateral stick", COLUMN.protection_lateral_stick_reason),
+    ("pedals", COLUMN.protection_pedal_reason),
 )
 _REASON_COLOURS = (
     "#c62828", "#1f5fa8", "#5c3a92", "#555555", "#777777", "#00796b",
@@ -192,6 +194,11 @@ def _draw_changes(axes: Any, rows: FloatArray) -> None:
     time = rows[:, COLUMN.time_s]
     axes.plot(time, rows[:, COLUMN.protection_stick], label="stick", color="#1f5fa8", linewidth=1.1)
     axes.plot(time, rows[:, COLUMN.protection_lever], label="lever", color="#c77700", linewidth=1.1)
+    for column, label, colour in (
+        (COLUMN.protection_lateral_stick, "lateral stick", "#2e7d32"), (COLUMN.protection_pedal, "pedals", "#ad1457"),
+    ):  # fmt: skip
+        if rows[:, column].any():
+            axes.plot(time, rows[:, column], label=label, color=colour, linewidth=1.1)
     rate = rows[:, COLUMN.protection_nacelle_rate_deg_s] / 7.5
     axes.plot(time, rate, label="nacelle rate / 7.5 deg/s", color="#5c3a92", linewidth=1.1)
     axes.set_ylim(*_at_least(axes.get_ylim(), 0.2))
@@ -201,7 +208,8 @@ def _draw_changes(axes: Any, rows: FloatArray) -> None:
 
 def _draw_lanes(axes: Any, found: Sequence[dict[str, Any]]) -> None:
     """One lane for each channel, coloured by the limit the law acted for."""
-    names = [channel for channel, _ in _CHANNELS]
+    acted = {item["channel"] for item in found}
+    names = [channel for place, (channel, _) in enumerate(_CHANNELS) if place < 3 or channel in acted]
     seen: set[str] = set()
     for item in found:
         limit = item["limit"]

@@ -27,16 +27,41 @@ _FIRST_PRESS_S, _REPEAT_S = 0.45, 0.12
 """How long a key counts as held after its first press (until repeats begin), and after a repeat [s]."""
 _STICK_PRESS_S = 0.15
 _AXIS_KEYS = {"w": (0, 1.0), "s": (0, -1.0), "d": (1, 1.0), "a": (1, -1.0), "e": (2, 1.0), "q": (2, -1.0)}
-_ARROWS = {"\x1b[A": "w", "\x1b[B": "s", "\x1b[C": "d", "\x1b[D": "a", "\x1bOA": "w", "\x1bOB": "s"}
+_ARROWS = {
+    "\x1b[A": "w",
+    "\x1b[B": "s",
+    "\x1b[C": "d",
+    "\x1b[D": "a",
+    "\x1bOA": "w",
+    "\x1bOB": "s",
+    "\x1bOC": "d",
+    "\x1bOD": "a",
+}
 _LEVER_KEYS = {"r": LEVER_STEP, "f": -LEVER_STEP, "R": 5 * LEVER_STEP, "F": -5 * LEVER_STEP}
 _HELD_KEYS = {"m": 5, "n": 4}
-_ONCE_KEYS = {"t": 6, " ": 7, "h": 8, "p": 9, "+": 11, "-": 12, "o": 13, "0": 14, "u": 15, "v": 16, "b": 17, "g": 18}
+_ONCE_KEYS = {
+    "t": 6,
+    " ": 7,
+    "h": 8,
+    "p": 9,
+    "+": 11,
+    "-": 12,
+    "o": 13,
+    "0": 14,
+    "u": 15,
+    "v": 16,
+    "b": 17,
+    "g": 18,
+    ",": 19,
+    ".": 20,
+}
 KEY_HELP = (
     ("w s, up down", "stick forward and back"),
-    ("a d, left right", "stick left and right (shown, does not act)"),
+    ("a d, left right", "stick left and right"),
+    ("q e", "pedals left and right"),
     ("r f, R F", "power lever up and down, small and large steps"),
     ("m, n", "hold: nacelles to the airplane, to the helicopter"),
-    ("+ -", "trim nose down, up"),
+    ("+ -, comma stop", "trim nose down, up, stick to the left, to the right"),
     ("t, h", "rate damping, attitude retention on or off"),
     ("v b", "flaps down, up one setting (0, 20, 40, 75 deg)"),
     ("u, g", "automatic flaps, rotor-speed governor on or off"),
@@ -69,6 +94,8 @@ KEYBOARD_MAP = GamepadMap(
         "flaps_down": 16,
         "flaps_up": 17,
         "governor": 18,
+        "trim_left": 19,
+        "trim_right": 20,
     },
 )
 """The keyboard in terms of a gamepad."""

@@ -62,14 +62,15 @@ class Controls:
     pressed: frozenset[str] = field(default_factory=frozenset)
     """Functions whose button went down since the last look, for what is no bit: ``arm``, ``reset``."""
 
-    def manual_control(self) -> tuple[int, int, int, int, int]:
-        """x, y, z, r and buttons of MANUAL_CONTROL."""
+    def manual_control(self) -> tuple[int, int, int, int, int, int]:
+        """x, y, z, r, buttons and buttons2 of MANUAL_CONTROL."""
         return (
             _thousandths(self.stick),
             _thousandths(self.lateral),
             _thousandths(self.lever),
             _thousandths(self.yaw),
             self.buttons & 0xFFFF,
+            self.buttons >> 16,
         )
 
 
@@ -163,6 +164,8 @@ def function_words() -> Mapping[str, str]:
         "pilot": "hand over: virtual pilot, you, held",
         "trim_forward": "trim nose down",
         "trim_aft": "trim nose up",
+        "trim_left": "trim the stick to the left",
+        "trim_right": "trim the stick to the right",
         "automatic_flaps": "automatic flaps on or off",
         "flaps_up": "flaps up one setting",
         "flaps_down": "flaps down one setting",

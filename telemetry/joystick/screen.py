@@ -65,8 +65,8 @@ def picture(controls: Controls, vehicle: VehicleView, *, device: str, rate_hz: f
     rows = (
         ("stick (forward right)", controls.stick, True),
         ("power lever", controls.lever, False),
-        ("lateral", controls.lateral, True),
-        ("yaw", controls.yaw, True),
+        ("lateral stick", controls.lateral, True),
+        ("pedals", controls.yaw, True),
     )
     for name, value, centred in rows:
         sticks.add_row(name, Text(bar(value, centred=centred)), f"{value:+.2f}" if centred else f"{value:.2f}")

@@ -137,8 +137,7 @@ class Sender:
         if self.vehicle.system_id == 0:
             return
         self._act(controls.pressed)
-        x, y, z, r, buttons = controls.manual_control()
-        self._send(dialect.MAVLink_manual_control_message(self.vehicle.system_id, x, y, z, r, buttons))
+        self._send(dialect.MAVLink_manual_control_message(self.vehicle.system_id, *controls.manual_control()))
         self.sent += 1
 
     def close(self) -> None:

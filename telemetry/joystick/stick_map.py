@@ -36,6 +36,8 @@ Function = Literal[
     "flaps_up",
     "flaps_down",
     "governor",
+    "trim_left",
+    "trim_right",
 ]
 """What a button of the vehicle can do."""
 DeviceFunction = Literal[Function, "arm", "reset", "lever_up", "lever_down"]
@@ -43,14 +45,14 @@ DeviceFunction = Literal[Function, "arm", "reset", "lever_up", "lever_down"]
 
 
 class Shape(Strict):
-    """``[shape]`` of a vehicle map: the longitudinal stick."""
+    """``[shape]`` of a vehicle map: stick and pedals."""
 
     dead_band: _DeadBand = 0.0
     """Part of half travel around the centre that counts as the centre."""
     expo: _Part = 0.0
     """0 straight, 1 cubic."""
     scale: Annotated[float, Field(ge=0.1, le=1.0, allow_inf_nan=False)] = 1.0
-    """Stick at full deflection, part of half travel."""
+    """Stick and pedals at full deflection, part of half travel."""
 
 
 class NacelleSwitchTable(Strict):
@@ -72,7 +74,7 @@ class VehicleMap(Strict):
     axes: dict[Literal["stick", "lateral", "lever", "yaw", "nacelle"], _ManualAxis] = {}
     """MANUAL_CONTROL axis behind each control; a leading ``-`` reverses, an empty text takes it away."""
     shape: Shape = Shape()
-    """Shaping of the longitudinal stick."""
+    """Shaping of stick and pedals."""
     nacelle: NacelleSwitchTable = NacelleSwitchTable()
     """The nacelle switch."""
     buttons: dict[Function, _Button] = {}

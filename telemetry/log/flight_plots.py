@@ -59,6 +59,16 @@ _CONTROLS = (
     _Panel("Collective at 75 % radius", ("collective_75_deg",)),
     _Panel("Cyclic and elevator", ("cyclic_deg", "elevator_deg")),
 )
+_LATERAL_CONTROLS = (
+    _Panel(
+        "Lateral stick, 1 is full right",
+        ("lateral_stick",),
+        ("pilot_lateral_stick",),
+        "protection_lateral_stick_reason",
+    ),
+    _Panel("Pedals, 1 is full right", ("pedal",), ("pilot_pedal",), "protection_pedal_reason"),
+)
+_TRAVELS = ("stick", "lever", "lateral_stick", "pedal")
 _ROTOR = (
     _Panel("Flapping", ("flapping_deg", "longitudinal_flapping_deg", "lateral_flapping_deg")),
     _Panel("Torque of one mast", ("mast_torque_inlb",)),
@@ -99,7 +109,7 @@ def _pictures(log: FlightLog) -> list[_Picture]:
     pictures: list[_Picture] = [
         ("corridor", _draw_corridor, (7.5, 6.5)),
         ("flight", lambda flight, figure: _draw_panels(flight, figure, _FLIGHT), (9.0, 9.0)),
-        ("controls", lambda flight, figure: _draw_panels(flight, figure, _CONTROLS), (9.0, 9.0)),
+        ("controls", _draw_controls, (9.0, 9.0)),
         ("flapping", lambda flight, figure: _draw_panels(flight, figure, _ROTOR), (9.0, 9.0)),
         ("margins", _draw_margins, (9.0, 6.0)),
         ("signals", _draw_all_signals, (15.0, 18.0)),
@@ -169,6 +179,11 @@ def _legend(axes: Axes, *, size: float = 8.0) -> None:
     )
 
 
+def _draw_controls(log: FlightLog, figure: Figure) -> None:
+    sideways = any(log[panel.signals[0]].any() or log[panel.dashed[0]].any() for panel in _LATERAL_CONTROLS)
+    _draw_panels(log, figure, _CONTROLS + _LATERAL_CONTROLS if sideways else _CONTROLS)
+
+
 def _draw_panels(log: FlightLog, figure: Figure, panels: tuple[_Panel, ...]) -> None:
     rows = figure.subplots(len(panels), 1, sharex=True)
     for axes, panel in zip(rows, panels, strict=True):
@@ -180,7 +195,7 @@ def _draw_panels(log: FlightLog, figure: Figure, panels: tuple[_Panel, ...]) -> 
             _shade_protection(axes, log, panel.reason)
         unit = log.unit(panel.signals[0])
         axes.set_title(panel.title, loc="left")
-        axes.set_ylabel(f"[{unit}]" if unit else "share of travel" if panel.signals[0] in {"stick", "lever"} else "[-]")
+        axes.set_ylabel(f"[{unit}]" if unit else "share of travel" if panel.signals[0] in _TRAVELS else "[-]")
         _legend(axes)
     rows[-1].set_xlabel("time [s]")
 

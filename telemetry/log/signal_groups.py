@@ -15,7 +15,7 @@ _UNIT_ENDINGS = sorted((unit.suffix for unit in UNITS.values() if unit.suffix), 
 """How signals end in their unit, longer ones first."""
 _TITLES = {
     "plots/position/m_per_s": "Velocity in body axes",
-    "plots/controls/plain": "Stick and lever",
+    "plots/controls/plain": "Sticks, lever and pedals",
     "plots/rotor/plain": "Rotor load CT/sigma, advance ratio",
     "plots/controls/deg": "Control angles",
     "plots/corridor/kn": "Margins to the corridor",

@@ -14,7 +14,7 @@ from telemetry.exchange.shared_memory import WORD, Kept, Queue, SequenceLock, Sh
 
 _MAGIC = 0x5254_5349_4D4D_4156
 _HEADER_WORDS = 32
-_STICK_COUNT = 14
+_STICK_COUNT = 15
 _REQUEST = struct.Struct("<16s24sd")
 _REQUEST_SLOTS = 256
 _TEXT = struct.Struct("<B55s")
@@ -50,9 +50,9 @@ class Feedback(NamedTuple):
     lever: float = 0.0
     """Power lever that acts, 0 to 1."""
     lateral: float = 0.0
-    """Lateral stick as shown, -1 to 1."""
+    """Lateral stick that acts, -1 to 1."""
     yaw: float = 0.0
-    """Pedals as shown, -1 to 1."""
+    """Pedals that act, -1 to 1."""
     nacelle_switch: float = 0.0
     """Nacelle switch that acts: -1, 0, 1."""
     nacelle_command: float = 0.0
@@ -68,7 +68,8 @@ class Feedback(NamedTuple):
     ended: float = 0.0
     """1 once the flight is over."""
     waiting: float = 0.0
-    """Controls that stay where they are until their hand moves through them: 1 the stick, 2 the lever."""
+    """Controls that stay where they are until their hand moves through them: 1 the stick, 2 the lever, 4 the lateral
+    stick, 8 the pedals."""
 
 
 # Offsets in bytes; every part begins on a word.
@@ -132,9 +133,10 @@ class Exchange:
         """Publish a stick input.
 
         Args:
-            sticks: What the sticks say; ``stick_valid`` and ``lever_valid`` travel as bits.
+            sticks: What the sticks say; whether each is valid travels as a bit.
         """
-        valid = int(sticks.stick_valid) | int(sticks.lever_valid) << 1
+        held = (sticks.stick_valid, sticks.lever_valid, sticks.lateral_valid, sticks.yaw_valid)
+        valid = sum(flag << bit for bit, flag in enumerate(held))
         self._stick.write(
             (
                 float(sticks.sequence),
@@ -151,6 +153,7 @@ class Exchange:
                 float(sticks.owner),
                 float(sticks.stream),
                 float(sticks.overridden),
+                float(sticks.lateral_trim),
             )
         )
 
@@ -159,8 +162,9 @@ class Exchange:
         values = self._stick.read()
         if values is None:
             return None
-        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, *whole = values
+        sequence, received, stick, lever, lateral, yaw, valid, switch, angle, *whole, lateral_trim = values
         bits = int(valid)
+        trim, buttons, owner, stream, overridden = map(int, whole)
         return StickInput(
             int(sequence),
             int(received),
@@ -172,7 +176,14 @@ class Exchange:
             bool(bits & 2),
             int(switch),
             angle,
-            *map(int, whole),
+            trim,
+            buttons,
+            owner,
+            stream,
+            overridden,
+            bool(bits & 4),
+            bool(bits & 8),
+            int(lateral_trim),
         )
 
     def write_feedback(self, feedback: Feedback) -> None:

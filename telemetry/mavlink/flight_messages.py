@@ -161,8 +161,8 @@ class FlightMessages:
             loop_value(state, "work_us") * 1e-3,
             1e3 * state.feedback.age,
             state.shown_stick,
-            state.feedback.lateral,
-            state.feedback.yaw,
+            state.shown_lateral_stick,
+            state.shown_pedal,
             value("corridor_level"),
             value("flap_deg"),
         ]
@@ -173,10 +173,10 @@ class FlightMessages:
         """RC_CHANNELS: the sticks as applied."""
         state = self._state
         channels = (
-            1500.0 + 500.0 * state.feedback.lateral,
+            1500.0 + 500.0 * state.shown_lateral_stick,
             1500.0 - 500.0 * state.shown_stick,
             1000.0 + 1000.0 * state.shown_lever,
-            1500.0 + 500.0 * state.feedback.yaw,
+            1500.0 + 500.0 * state.shown_pedal,
             1500.0 - 500.0 * state.feedback.nacelle_switch,
             1000.0 + 1000.0 * state.nacelle_command_deg / 90.0,
             {PILOT_EXTERNAL: 1500.0, PILOT_HOLD: 2000.0}.get(state.pilot, 1000.0),

@@ -29,8 +29,10 @@ STANDARD_BUTTONS: dict[str, int] = {
     "flaps_up": 13,
     "flaps_down": 14,
     "governor": 15,
+    "trim_left": 16,
+    "trim_right": 17,
 }
-"""Button number of each function."""
+"""Button number of each function; from 16 on they are those of ``buttons2``."""
 EDGE_BUTTONS = (
     "rate_damping",
     "freeze",
@@ -43,7 +45,7 @@ EDGE_BUTTONS = (
 )
 """Functions that act once when their button goes down; the others act while it is held."""
 _RELEASE, _IGNORE = 0, 65535
-_CHANNEL_BITS = {"stick": 1, "lever": 2, "nacelle": 4}
+_CHANNEL_BITS = {"stick": 1, "lever": 2, "nacelle": 4, "lateral": 8, "yaw": 16}
 _Said = dict[str, tuple[float, int]]
 """What one message said, and when, by control."""
 
@@ -197,6 +199,7 @@ class StickReader:
             self._manual.pop("nacelle", None)
         self._manual["switch"] = held["nacelle_aft"] - held["nacelle_forward"], received_ns
         self._manual["trim"] = held["trim_forward"] - held["trim_aft"], received_ns
+        self._manual["lateral_trim"] = held["trim_right"] - held["trim_left"], received_ns
         self._manual["buttons"] = buttons, received_ns
         pressed, self.held_down = buttons & ~self.held_down, buttons
         self._merge(received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
@@ -259,6 +262,9 @@ class StickReader:
             owner=pilot.number,
             stream=self._stream,
             overridden=overridden,
+            lateral_valid="lateral" in values,
+            yaw_valid="yaw" in values,
+            lateral_trim=int(values.get("lateral_trim", 0)),
         )
 
     def _carried(self, message: Any, control: str) -> bool:

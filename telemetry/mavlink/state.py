@@ -164,6 +164,16 @@ class FlightState:
         """Power lever as the hands hold it; the acting one while nobody's hands fly."""
         return self.feedback.lever if self.pilot == PILOT_EXTERNAL else self.value("lever")
 
+    @property
+    def shown_lateral_stick(self) -> float:
+        """Lateral stick as the hands hold it; the acting one while nobody's hands fly."""
+        return self.feedback.lateral if self.pilot == PILOT_EXTERNAL else self.value("lateral_stick")
+
+    @property
+    def shown_pedal(self) -> float:
+        """Pedals as the feet hold them; the acting ones while nobody's feet fly."""
+        return self.feedback.yaw if self.pilot == PILOT_EXTERNAL else self.value("pedal")
+
     def update_vtol_state(self) -> None:
         """Helicopter above 85 deg, airplane below 2 deg, else the way the nacelles move, moved last, or are sent."""
         angle, rate = self.value("nacelle_deg"), self.value("nacelle_rate_deg_s")

@@ -28,7 +28,6 @@ class StickPort:
             outbox: What the vehicle shares with its parts.
         """
         self._outbox = outbox
-        self._explained = False
         self.pilot: PilotId | None = None
         """Whose sticks came last."""
         self.bipolar = False
@@ -78,12 +77,8 @@ class StickPort:
                 self._press(function)
         else:
             outbox.reader.override(message, received_ns=received_ns, pilot=pilot, lasts_ns=lasts_ns)
-        sticks = outbox.reader.sticks
-        outbox.exchange.write_sticks(sticks)
+        outbox.exchange.write_sticks(outbox.reader.sticks)
         outbox.exchange.header[ACCEPTED] += 1
-        if not self._explained and max(abs(sticks.lateral), abs(sticks.yaw)) > 0.2:
-            self._explained = True
-            board.say(INFO, "Roll and yaw are shown but do not act")
 
     def _press(self, function: str) -> None:
         """A button that acts once went down."""

@@ -49,6 +49,11 @@ LONGEST_PAUSE_S = 0.02
 """Changes in the flight are noticed at least this often [s]."""
 _LIST_PAUSE_S = 0.004
 _CHALLENGE_S = 0.3
+_WAITING_TEXTS = {
+    1: "Stick stays at trim: centre yours first",
+    4: "Lateral stick stays centred: centre yours first",
+    8: "Pedals stay centred: centre yours first",
+}
 _GROUND_HEARTBEAT, _PING, _SET_MODE, _COMMAND_INT, _COMMAND_LONG = 0, 4, 11, 75, 76
 
 
@@ -314,8 +319,9 @@ class Vehicle(Outbox):
         if self._waiting & ~waiting & 2:
             lever = 100.0 * self.state.feedback.lever
             self.board.say_seldom("lever", NOTICE, f"Lever stays at {lever:.0f} %: move yours through it", self.now)
-        if self._waiting & ~waiting & 1:
-            self.board.say_seldom("stick", NOTICE, "Stick stays at trim: centre yours first", self.now)
+        for bit, text in _WAITING_TEXTS.items():
+            if self._waiting & ~waiting & bit:
+                self.board.say_seldom(text, NOTICE, text, self.now)
 
     def _look_after_peers(self, now: float) -> None:
         owner = self.lock.owner

@@ -20,12 +20,22 @@ LEVEL_NAMES = ("CLEAR", "CAUTION", "WARNING", "EXCEEDANCE")
 """States of the corridor line."""
 PILOT_NAMES = ("MOCM", "EXTERNAL", "HOLD")
 """States of the pilot line, by ``pilot_mode``."""
+_REASONS = {
+    "STICK": COLUMN.protection_stick_reason,
+    "LEVER": COLUMN.protection_lever_reason,
+    "NACELLES": COLUMN.protection_nacelle_reason,
+    "LATERAL STICK": COLUMN.protection_lateral_stick_reason,
+    "PEDALS": COLUMN.protection_pedal_reason,
+}
 ACTING_NAMES = (
-    "NOT ACTING", "ON STICK", "ON LEVER", "ON STICK, LEVER",
-    "ON NACELLES", "ON STICK, NACELLES", "ON LEVER, NACELLES", "ON ALL",
-)  # fmt: skip
-"""States of the protection line, by the sum of 1 for the stick, 2 for the lever and 4 for the nacelles."""
-_REASONS = (COLUMN.protection_stick_reason, COLUMN.protection_lever_reason, COLUMN.protection_nacelle_reason)
+    "NOT ACTING",
+    *(
+        f"ON {', '.join(name for place, name in enumerate(_REASONS) if acting >> place & 1)}"
+        for acting in range(1, 1 << len(_REASONS))
+    ),
+)
+"""States of the protection line, by the sum of 1 for the stick, 2 for the lever, 4 for the nacelles, 8 for the lateral
+stick and 16 for the pedals."""
 HELICOPTER_FROM_DEG = 85.0
 """At and above this nacelle angle the aircraft flies as a helicopter [deg]."""
 EVENT_LEVELS = {"info": "INFO", "caution": "WARN", "warning": "ERROR", "exceedance": "CRITICAL"}
@@ -68,7 +78,7 @@ class Plots:
             ("events/mode", MODE_NAMES, ((59, 130, 196), (201, 138, 43), (76, 159, 112))),
             ("events/corridor", LEVEL_NAMES, ((47, 125, 79), (224, 176, 48), (240, 128, 48), (224, 72, 72))),
             ("events/pilot", PILOT_NAMES, ((91, 107, 140), (140, 91, 134), (119, 119, 119))),
-            ("events/protection", ACTING_NAMES, ((52, 58, 68), *[(150, 70, 170)] * 7)),
+            ("events/protection", ACTING_NAMES, ((52, 58, 68), *[(150, 70, 170)] * (len(ACTING_NAMES) - 1))),
         ):
             configuration = rr.StateConfiguration(values=states, labels=states, colors=state_colours)
             recording.log(path, configuration, static=True)
@@ -105,7 +115,7 @@ class Plots:
                 rows[:, COLUMN.nacelle_deg] >= HELICOPTER_FROM_DEG,
                 rows[:, COLUMN.corridor_level],
                 rows[:, COLUMN.pilot_mode],
-                *(rows[:, column] != 0.0 for column in _REASONS),
+                *(rows[:, column] != 0.0 for column in _REASONS.values()),
             ],
             axis=1,
         )
@@ -145,8 +155,8 @@ class Plots:
 
 
 def acting_on(row: FloatArray) -> int:
-    """What the protection law changes in a row: 1 the stick, 2 the lever, 4 the nacelles, or their sum."""
-    return sum(1 << place for place, column in enumerate(_REASONS) if row[column])
+    """What the protection law changes in a row: a sum as in ``ACTING_NAMES``."""
+    return sum(1 << place for place, column in enumerate(_REASONS.values()) if row[column])
 
 
 def set_row_time(recording: Any, row: FloatArray) -> None:

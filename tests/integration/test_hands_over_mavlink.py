@@ -60,8 +60,8 @@ class Ground:
         self.until(lambda: time.monotonic() >= end, *messages)
 
 
-def sticks(x=0, z=500, buttons=0):
-    return dialect.MAVLink_manual_control_message(1, x, 0, z, 0, buttons)
+def sticks(x=0, z=500, buttons=0, y=0, r=0):
+    return dialect.MAVLink_manual_control_message(1, x, y, z, r, buttons)
 
 
 OVERRIDE = dialect.MAVLink_rc_channels_override_message(1, 1, *[65535] * 8, *[1500] * 10)
@@ -96,6 +96,11 @@ def test_sticks_from_the_first_moment_on_and_a_flight_that_stops(tmp_path):
         ground.hold(0.5, sticks(x=100, z=700), OVERRIDE)
         assert ground.last["RC_CHANNELS"].chan3_raw == pytest.approx(1700, abs=1)
         assert ground.last["RC_CHANNELS"].chan2_raw == pytest.approx(1450, abs=1)
+        # Lateral stick and pedals, and back to their centres.
+        ground.hold(0.5, sticks(x=100, z=700, y=200, r=-300), OVERRIDE)
+        assert ground.last["RC_CHANNELS"].chan1_raw == pytest.approx(1600, abs=1)
+        assert ground.last["RC_CHANNELS"].chan4_raw == pytest.approx(1350, abs=1)
+        ground.hold(0.3, sticks(z=700), OVERRIDE)
         # A freeze and its end.
         for button in (1 << 7, 0, 1 << 7):
             ground.hold(0.2, sticks(z=700, buttons=button))
@@ -122,4 +127,6 @@ def test_sticks_from_the_first_moment_on_and_a_flight_that_stops(tmp_path):
     history = flown.history
     first = np.argmax(history[:, COLUMN.pilot_mode] == 1.0)
     assert np.ptp(history[first : first + 500, COLUMN.pilot_lever]) == 0.0
+    assert history[:, COLUMN.lateral_stick].max() == 0.2
+    assert history[:, COLUMN.pedal].min() == -0.3
     assert replay_log(log).same

@@ -116,12 +116,20 @@ def test_axes_and_buttons_become_manual_control():
     mapper = Mapper(XBOX, lever=0.4)
     state = DeviceState((0.5, 0.0, -1.0, -0.6, -1.0, -1.0), frozenset({4}), (1, 0))
     controls = mapper.controls(state, 0.02)
-    x, y, z, r, buttons = controls.manual_control()
+    x, y, z, r, buttons, more = controls.manual_control()
     assert x == 1000  # the stick pushed away from the body is -1 at the device and forward here
     assert -600 < y < -200
     assert z == 400
     assert 200 < r < 500
     assert buttons == 1 << 4 | 1 << 11  # nacelle aft, and trim forward from the cross
+    assert more == 0
+
+
+@pytest.mark.parametrize("name", ["extreme_3d", "t16000m"])
+def test_a_cross_with_room_trims_to_both_sides(name):
+    mapper = Mapper(load_gamepad_map(name))
+    sent = {right: mapper.controls(DeviceState((0.0,) * 4, hat=(right, 0)), 0.02).manual_control() for right in (-1, 1)}
+    assert {right: buttons[4:] for right, buttons in sent.items()} == {-1: (0, 1), 1: (0, 2)}
 
 
 def test_a_lever_that_springs_back_moves_the_lever():
@@ -230,6 +238,26 @@ def test_keys_move_sticks_lever_and_nacelles(terminal):
     assert not keyboard.finished
     press(master, keyboard, "x", mapper)
     assert keyboard.finished
+
+
+@pytest.mark.parametrize(
+    ("keys", "y", "r"),
+    [("d", 1, 0), ("a", -1, 0), ("\x1b[C", 1, 0), ("\x1bOD", -1, 0), ("e", 0, 1), ("q", 0, -1), ("aq", -1, -1)],
+)
+def test_keys_move_lateral_stick_and_pedals(terminal, keys, y, r):
+    master, keyboard = terminal
+    controls = press(master, keyboard, keys, Mapper(KEYBOARD_MAP))
+    assert (controls.lateral, controls.yaw) == (y * 0.35, r * 0.35)
+    assert controls.manual_control()[1] == y * 350
+    assert controls.manual_control()[3] == r * 350
+    assert controls.stick == 0.0
+
+
+def test_keys_trim_to_both_sides(terminal):
+    master, keyboard = terminal
+    assert press(master, keyboard, ",", Mapper(KEYBOARD_MAP)).manual_control()[4:] == (0, 1)
+    time.sleep(0.2)
+    assert press(master, keyboard, ".", Mapper(KEYBOARD_MAP)).manual_control()[4:] == (0, 2)
 
 
 def test_lever_keys_are_exact_steps(terminal):

@@ -140,8 +140,7 @@ def chain(*names, **options):
 
 def acting(laws, command):
     """The command as the compiled frame lets it act: held where the laws hold it."""
-    asked = (command.stick, command.lever, command.nacelle_rate)
-    return Command(*(own if math.isnan(held) else held for own, held in zip(asked, laws.held, strict=False)))
+    return Command(*(own if math.isnan(held) else held for own, held in zip(command.values, laws.held, strict=False)))
 
 
 def fly(laws, frames=50, command=PILOT, before=None):
@@ -167,8 +166,9 @@ def test_record_says_which_law_changed_what():
         ("chained_laws:Slower", "nacelle_rate"),
         ("chained_laws:Softer", "stick"),
     ]
-    own, none, rate = laws.reasons
+    own, none, rate, *lateral = laws.reasons
     assert (own, none, rate) == (module.OTHER_REASON, 0.0, 1.0 + LIMIT_KINDS.index("nacelle_rate"))
+    assert lateral == [0.0, 0.0]
 
 
 def test_laws_are_asked_fifty_times_a_second_and_held_between():

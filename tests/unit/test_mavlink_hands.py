@@ -230,6 +230,32 @@ def test_lost_input_is_reported_and_the_lever_stays(flight):
     assert set(rows[:, COLUMN.pilot_lever]) == {0.5}
 
 
+def test_lateral_stick_and_pedals_fly(flight):
+    """They act in the row, come back in the report, and make no step when the virtual pilot takes over and back."""
+    live(flight, lateral_valid=True, yaw_valid=True)
+    fly(flight, 60)
+    live(flight, lateral_valid=True, yaw_valid=True, lateral=0.4, yaw=-0.3)
+    rows = fly(flight, 30)
+    lateral = [COLUMN.lateral_stick, COLUMN.pedal]
+    assert rows[-1, lateral].tolist() == [0.4, -0.3]
+    assert rows[-1, [COLUMN.pilot_lateral_stick, COLUMN.pilot_pedal]].tolist() == [0.4, -0.3]
+    assert (flight.link.reports[-1].lateral, flight.link.reports[-1].yaw) == (0.4, -0.3)
+    flight.session.switch_pilot("mocm")
+    taken = fly(flight, 100)
+    flight.session.switch_pilot("external", by_hand=True)
+    back = fly(flight, 100)
+    steps = np.diff(np.vstack((rows[-1:], taken, back))[:, lateral], axis=0)
+    assert np.abs(steps).max() <= 0.01
+    assert int(flight.link.reports[-1].waiting) & 12 == 12  # hand and feet are elsewhere
+    assert np.abs(back[-1, lateral]).max() < 0.25
+
+
+def test_a_hand_on_the_pedals_alone_takes_the_controls(flight):
+    flight.link.input.sticks = StickInput(sequence=1, received_ns=1, yaw_valid=True)
+    flight.link.input.seconds = 0.001
+    assert set(fly(flight, 5)[:, COLUMN.pilot_mode]) == {1.0}
+
+
 def test_parameters_change_the_hands_and_are_noted(flight):
     live(flight, nacelle_switch=-1)
     flight.link.input.asked = [Request("parameter", "XV_NAC_RATE", 1.0)]

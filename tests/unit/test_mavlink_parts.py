@@ -72,6 +72,25 @@ def test_a_full_queue_refuses_and_goes_on(pair):
     assert flight.take_requests() == [Request("reset")]
 
 
+@given(
+    st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4),
+    st.lists(st.booleans(), min_size=4, max_size=4),
+    st.lists(st.integers(-1, 1), min_size=3, max_size=3),
+    st.integers(0, 31),
+)
+def test_sticks_pass_whole(values, held, switches, overridden):
+    exchange = Exchange()
+    stick, lever, lateral, yaw = values
+    sticks = StickInput(
+        sequence=3, received_ns=7, stick=stick, lever=lever, lateral=lateral, yaw=yaw, stick_valid=held[0],
+        lever_valid=held[1], lateral_valid=held[2], yaw_valid=held[3], nacelle_switch=switches[0], nacelle_angle=0.5,
+        trim=switches[1], lateral_trim=switches[2], buttons=1 << 31, owner=65535, stream=9, overridden=overridden,
+    )  # fmt: skip
+    exchange.write_sticks(sticks)
+    assert exchange.read_sticks() == sticks
+    exchange.close()
+
+
 WRITER = """
 import sys
 from rtsim.command import StickInput

@@ -601,6 +601,53 @@ def test_manual_control_axes(bench):
     assert math.isnan(sticks.nacelle_angle)
 
 
+def test_lateral_axes_are_held_lost_and_given_back_like_the_stick(bench):
+    bench.send(manual(y=-300, r=400))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lateral_valid, sticks.yaw_valid, sticks.held) == (True, True, True)
+    for _ in range(40):
+        bench.fly(0.02)
+        bench.send(manual(y=32767, r=400))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lateral_valid, sticks.lateral, sticks.yaw_valid, sticks.yaw) == (False, 0.0, True, 0.4)
+
+
+def test_lateral_override_channels_are_held_taken_and_released(bench):
+    bench.send(manual(y=100, r=100))
+    bench.send(override(1750, 65535, 65535, 1250))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lateral, sticks.yaw, sticks.overridden) == (0.5, -0.5, 8 | 16)
+    bench.send(override(0, 65535, 65535, 65535))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lateral, sticks.yaw, sticks.overridden) == (0.1, -0.5, 16)
+    bench.send(override(65535, 65535, 65535, 0))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.lateral_valid, sticks.yaw_valid, sticks.overridden) == (True, True, 0)
+
+
+def test_a_channel_alone_is_a_hand_on_it(bench):
+    bench.send(override(1750))
+    sticks = bench.exchange.read_sticks()
+    assert (sticks.held, sticks.lateral_valid, sticks.stick_valid, sticks.yaw_valid) == (True, True, False, False)
+
+
+def test_the_sticks_as_applied_are_told_back(bench):
+    """Those of the hands while they fly, else those that act."""
+    bench.feedback = bench.feedback._replace(lateral=-0.25, yaw=0.5)
+    bench.signals |= {"lateral_stick": 0.1, "pedal": -0.1, "pilot_mode": 1.0}
+    bench.taken()
+    bench.fly(0.3)
+    channels = bench.taken("RC_CHANNELS")[-1]
+    assert (channels.chan1_raw, channels.chan4_raw) == (1375, 1750)
+    bench.signals["pilot_mode"] = 0.0
+    bench.fly(0.3)
+    sent = bench.taken()
+    channels = [message for message in sent if message.get_type() == "RC_CHANNELS"][-1]
+    assert (channels.chan1_raw, channels.chan4_raw) == (1550, 1450)
+    arrays = [message for message in sent if message.get_type() == "DEBUG_FLOAT_ARRAY"]
+    assert arrays[-1].data[12:14] == pytest.approx([0.1, -0.1])
+
+
 def test_bad_axes_keep_the_last_good_value(bench):
     bench.send(manual(x=250, z=700))
     bench.send(manual(x=32767, z=-1000))
@@ -669,6 +716,9 @@ def test_buttons(bench):
         Request("aid", "rate_damping", 2.0),
         Request("pilot", "next"),
     ]
+    for more, trim in ((1, -1), (2, 1), (3, 0), (0, 0)):
+        bench.send(manual(buttons2=more))
+        assert bench.exchange.read_sticks().lateral_trim == trim
     bench.send(manual(buttons2=1 << 3))
     assert bench.exchange.read_sticks().buttons == 1 << 19
 
@@ -889,10 +939,13 @@ def test_texts_are_short_and_seldom(bench):
     assert len(texts) <= 4 + 2 * 4 + 1
 
 
-def test_roll_and_yaw_are_said_not_to_act(bench):
-    bench.send(manual(y=800))
-    bench.fly(1.0)
-    assert any("do not act" in text for text in bench.texts())
+def test_waiting_sticks_and_pedals_are_told(bench):
+    for bits, words in ((4, "Lateral stick stays centred"), (8, "Pedals stay centred"), (1, "Stick stays at trim")):
+        bench.feedback = bench.feedback._replace(waiting=float(bits))
+        bench.fly(1.0)
+        assert [text for text in bench.texts() if words in text], words
+        bench.feedback = bench.feedback._replace(waiting=0.0)
+        bench.fly(1.0)
 
 
 def test_timesync_ping_missions_and_files(bench):

@@ -93,6 +93,21 @@ def test_the_controls_are_shaded_while_protection_acts(tmp_path: Path) -> None:
     assert axes.get_legend_handles_labels()[1] == ["protection acts"]
 
 
+@pytest.mark.parametrize("moved", ["", "lateral_stick", "pilot_pedal"])
+def test_lateral_stick_and_pedals_are_drawn_where_they_were_used(tmp_path: Path, moved: str) -> None:
+    def move(rows: FloatArray) -> None:
+        if moved:
+            rows[50:, getattr(COLUMN, moved)] = 0.4
+
+    figure = Figure()
+    flight_plots._draw_controls(record(tmp_path / "flight.parquet", 100, timed=False, change=move), figure)
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert len(titles) == (6 if moved else 4)
+    if moved:
+        assert titles[-2:] == ["Lateral stick, 1 is full right", "Pedals, 1 is full right"]
+        assert figure.axes[-1].get_ylabel() == "share of travel"
+
+
 def test_marks_that_would_cover_one_another_become_one(tmp_path: Path) -> None:
     def stop(rows: FloatArray) -> None:
         for column in (COLUMN.airspeed_kt, COLUMN.nacelle_deg):

@@ -102,7 +102,7 @@ def test_layouts_name_only_entities_that_are_logged(layout: str) -> None:
 def test_a_plot_says_its_unit_once() -> None:
     titles = {group.path: group.title for group in plot_groups()}
     assert titles[plot_path("mast_torque_inlb")] == "Mast torque [in lb]"
-    assert titles[plot_path("stick")] == "Stick and lever [-]"
+    assert titles[plot_path("stick")] == "Sticks, lever and pedals [-]"
     assert plot_path("protection_stick") != plot_path("protection_stick_reason"), "a number of a limit is no share"
     for signal in LOG_SIGNALS:
         if signal.unit and signal.name not in FLAGS:
@@ -119,6 +119,9 @@ def test_the_view_says_on_what_protection_acts() -> None:
     assert ACTING_NAMES[acting_on(row)] == "ON LEVER"
     row[COLUMN.protection_nacelle_reason] = 1.0
     assert ACTING_NAMES[acting_on(row)] == "ON LEVER, NACELLES"
+    row[COLUMN.protection_pedal_reason] = 1.0
+    assert ACTING_NAMES[acting_on(row)] == "ON LEVER, NACELLES, PEDALS"
+    assert len(set(ACTING_NAMES)) == 32
 
 
 def _views(part: object) -> list[object]:

@@ -294,6 +294,64 @@ def test_trim_buttons_move_the_centre():
     assert commands[-1].stick == pytest.approx(0.3, abs=1e-3)
 
 
+BOTH = LIVE._replace(lateral_valid=True, yaw_valid=True)
+
+
+def test_lateral_stick_and_pedals_are_applied_in_the_frame_that_reads_them():
+    hands = handler(StickSettings(dead_band=0.1, expo=0.5))
+    fly(hands, BOTH, frames=60)
+    for lateral, pedal in ((0.3, -1.0), (-0.77, 0.05), (0.0, 0.5)):
+        command = fly(hands, BOTH._replace(lateral=lateral, yaw=pedal), frames=1)[0][0]
+        assert command.lateral_stick == shaped(hands.settings, lateral)
+        assert command.pedal == shaped(hands.settings, pedal)
+        assert (hands.lateral_stick, hands.pedal) == (command.lateral_stick, command.pedal)
+    assert command.stick == 0.0
+
+
+@pytest.mark.parametrize(("field", "channel", "bit"), [("lateral", "lateral_stick", 4), ("yaw", "pedal", 8)])
+def test_lateral_controls_wait_for_their_hand_and_go_home_without_it(field, channel, bit):
+    hands = handler()
+    away = BOTH._replace(**{field: 0.4})
+    commands, _ = fly(hands, away, frames=50)
+    assert {getattr(command, channel) for command in commands} == {0.0}
+    assert hands.waiting == bit
+    fly(hands, BOTH, frames=60)
+    assert hands.waiting == 0
+    commands, _ = fly(hands, away, frames=60)
+    assert getattr(commands[-1], channel) == 0.4
+    lost, _ = fly(hands, away._replace(**{f"{field}_valid": False}), frames=100)
+    values = np.array([0.4, *(getattr(command, channel) for command in lost)])
+    assert np.abs(np.diff(values)).max() <= 0.02
+    assert values[-1] == 0.0
+    fly(hands, BOTH._replace(**{field: 0.2}), frames=50)
+    assert hands.waiting == bit  # back, but not at its centre
+    fly(hands, BOTH._replace(**{field: -0.1}), frames=100)
+    commands, _ = fly(hands, BOTH._replace(**{field: 0.5}, overridden=24), frames=100)
+    assert getattr(commands[-1], channel) == 0.0  # another message's hand
+    hands.engage(Command(0.0, 0.6, 0.0, 0.3, 0.3))
+    assert getattr(fly(hands, BOTH, frames=1)[0][0], channel) == 0.0
+
+
+def test_a_channel_alone_keeps_the_hands_alive():
+    hands = handler()
+    fly(hands, StickInput(sequence=1, stream=1, yaw_valid=True), frames=2)
+    assert hands.state == INPUT_LIVE
+    fly(hands, StickInput(sequence=1, stream=1, yaw_valid=True), frames=2, age=1.0)
+    assert hands.state == INPUT_LOST
+
+
+def test_lateral_trim_moves_its_own_centre():
+    hands = handler()
+    fly(hands, BOTH, frames=60)
+    commands, _ = fly(hands, BOTH._replace(lateral_trim=-1), frames=250)
+    assert commands[-1].lateral_stick == pytest.approx(-0.1, abs=1e-3)
+    assert (commands[-1].stick, commands[-1].pedal, hands.trim) == (0.0, 0.0, 0.0)
+    fly(hands, BOTH._replace(lateral_trim=-1, lateral_valid=False), frames=250)
+    assert hands.lateral_trim == pytest.approx(-0.1, abs=1e-3)
+    fly(hands, BOTH._replace(lateral_trim=-1), frames=2000)
+    assert hands.lateral_trim == -0.5
+
+
 @pytest.mark.parametrize("name", ["design", "flight"])
 def test_the_transition_stays_inside_the_corridor_and_never_turns_back(name):
     corridor = load_corridor(name)
