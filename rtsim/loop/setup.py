@@ -234,15 +234,16 @@ def build_parts(setup: FlightSetup) -> Parts:
     programme = setup.programme
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
     pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
+    lpv = None if nonlinear else _lpv_tables(database, options.plant)
     tables = SimulationTables(
         dt=dt,
         wind=float(options.wind),
         plant=PlantTables(
-            aircraft=Address(own if nonlinear else _lpv_tables(database, options.plant)),
+            aircraft=Address(own if nonlinear else lpv),
             configuration=own.configuration,
             controls=control_tables(profile),
             alpha_speed=scheduling_speed(database),
-            lateral=0,
+            lateral=1 if nonlinear or hasattr(lpv, "symmetric") else 0,
         ),
         nacelle=load_nacelle_tables(profile),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),

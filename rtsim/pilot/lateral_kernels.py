@@ -2,8 +2,8 @@
 
 It is built and moved as the longitudinal one (``pilot_kernels``); what differs is what it follows: it is asked for a
 turn rate, a heading and a lateral velocity. Bank, rates and hands of that motion are reckoned from trims and linear
-model and lead the hands: fed forward without a lead, a turn would be flown with sideslip, the pedals holding the heading
-against the bank.
+model and lead the hands: without a lead a turn would be flown with sideslip, the pedals holding the heading against
+the bank.
 
 Legend:
     tables: The pilot.
