@@ -109,6 +109,8 @@ def observe(flight: Flight) -> None:
         on_wheels = ground_contact(tables.ground, x, (ground_ahead, ground_right), state.u)
     where = place if tables.drive.held_acts == 0.0 else angle
     aircraft = tables.plant.aircraft
+    # Left at zero by an aircraft that knows no motion out of its plane of symmetry.
+    scratch.y[OUTPUT.thrust_difference] = scratch.y[OUTPUT.torque_difference] = scratch.y[OUTPUT.side_force] = 0.0
     call_at(flight.parts[PART.outputs], aircraft, x, state.u, where, scratch.y, scratch.xdot, scratch.work)
     scratch.y[OUTPUT.airspeed_rate] -= wind_gradient(tables.wind, x[STATE.altitude]) * climb * wind_ahead
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
