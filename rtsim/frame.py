@@ -179,7 +179,7 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("weight_on_wheels", "", "altitude", "Force of the ground on the wheels over the weight."),
     Signal("ground_effect", "", "rotor", "Ground effect: 0 far from the ground, 1 hovering on the wheels."),
     Signal("bank_deg", "deg", "attitude", "Bank angle, right positive."),
-    Signal("heading_deg", "deg", "attitude", "Heading, clockwise from north, 0 to 360."),
+    Signal("heading_deg", "deg", "course", "Heading, clockwise from north, 0 to 360."),
     Signal("roll_rate_deg_s", "deg/s", "attitude", "Body roll rate, right positive."),
     Signal("yaw_rate_deg_s", "deg/s", "attitude", "Body yaw rate, nose right positive."),
     Signal("turn_rate_deg_s", "deg/s", "attitude", "Rate of the heading, right positive."),
@@ -193,7 +193,7 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("lateral_acceleration", "", "loads", "Specific force along body y over g, right positive: the slip ball."),
     Signal("north_m", "m", "position", "Place north of the start."),
     Signal("east_m", "m", "position", "Place east of the start."),
-    Signal("track_deg", "deg", "attitude", "Course over the ground, 0 to 360; the heading where there is none."),
+    Signal("track_deg", "deg", "course", "Course over the ground, 0 to 360; the heading where there is none."),
     Signal("flapping_right_deg", "deg", "flapping", "Magnitude of the right rotor's flapping."),
     Signal("flapping_left_deg", "deg", "flapping", "Magnitude of the left rotor's flapping."),
     Signal("mast_torque_right_inlb", "in lb", "power", "Torque of the right mast."),
@@ -205,8 +205,8 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("gust_v_m_s", "m/s", "air", "Gust added to the air-relative velocity along body y."),
     Signal("gust_p_deg_s", "deg/s", "air", "Roll gust added to the air-relative roll rate."),
     Signal("gust_r_deg_s", "deg/s", "air", "Yaw gust added to the air-relative yaw rate."),
-    Signal("wind_north_m_s", "m/s", "air", "Wind at the aircraft towards the north."),
-    Signal("wind_east_m_s", "m/s", "air", "Wind at the aircraft towards the east."),
+    Signal("wind_north_m_s", "m/s", "wind", "Wind at the aircraft towards the north."),
+    Signal("wind_east_m_s", "m/s", "wind", "Wind at the aircraft towards the east."),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

@@ -162,7 +162,16 @@ wind_reference_height_m = 10
 turbulence = "moderate"
 lateral = true
 fade_in_s = 0.5
-gusts = [{ time_s = 1.0, below_kt = 6, lateral_kt = 5, length_m = 80 }, { time_s = 2.0, ahead_kt = -5, duration_s = 0, shape = "ramp" }]
+[[air.gusts]]
+time_s = 1.0
+below_kt = 6
+lateral_kt = 5
+length_m = 80
+[[air.gusts]]
+time_s = 2.0
+ahead_kt = -5
+duration_s = 0
+shape = "ramp"
 [[faults]]
 kind = "actuator-slow"
 actuator = "cyclic"
