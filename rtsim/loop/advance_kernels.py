@@ -12,6 +12,7 @@ from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVE
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
+from rtsim.atmosphere.wind_kernels import level_motion, level_speed, meet_wind, over_ground, wind_along, wind_share
 from rtsim.corridor.corridor_kernels import corridor_level_step
 from rtsim.faults.fault_kernels import FAULT, fault_actuators_end, fault_nacelle_rate
 from rtsim.frame import COLUMN, QUANTITY
@@ -42,11 +43,13 @@ from rtsim.units import DEGREE, HORSEPOWER, KNOT
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
 """Sink rates at touchdown up to which a landing counts as gentle or as hard [m/s]; beyond it is a crash. Ours: about
 300 and 600 ft/min, the usual normal and limit touchdown rates of helicopters (14 CFR 29.725 drops at 6.5 ft/s)."""
-LANDING_PITCH = 15.0 * DEGREE
+LANDING_PITCH = LANDING_BANK = 15.0 * DEGREE
 LANDING_NACELLE = 60.0 * DEGREE
 """Below this nacelle angle the proprotors (12.5 ft radius) would strike the ground."""
 LANDING_SPEED = 60.0 * KNOT
 LARGEST_PITCH = 80.0 * DEGREE
+LARGEST_BANK = 120.0 * DEGREE
+"""Ours: on its side it still flies; the model knows nothing of flight on the back."""
 _SPARE_S = 1.0
 """The rotors are back at full speed this long before the programme moves the nacelles [s]."""
 
@@ -257,7 +260,7 @@ def move_pilot(flight: Flight, normals: FloatArray) -> None:
 
 @inner_kernel
 def move_plant(flight: Flight) -> None:
-    """Move flaps, rotor drive, aircraft, nacelles and the distance flown over the frame.
+    """Move flaps, rotor drive, aircraft, nacelles and the place over the ground over the frame.
 
     Args:
         flight: The flight with its command at all stations.
@@ -283,9 +286,40 @@ def move_plant(flight: Flight) -> None:
     )
     if failing:
         fault_actuators_end(scratch.planned, x)
-    after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    state.clock[CLOCK.distance] += dt * (0.5 * (scratch.known[KNOWN.airspeed_in_air] + after) + tables.wind)
+    if tables.wind.reference_height != 0.0:
+        meet_wind(tables.wind, x, scratch.si[QUANTITY.altitude])
+    _move_place(flight, scratch.si[QUANTITY.heading])
     nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
+
+
+@inner_kernel
+def _move_place(flight: Flight, heading: float) -> None:
+    """Move the place over the ground and the distance flown, by the mean of the motion before and after the step.
+
+    Args:
+        flight: The flight after the step of its plant.
+        heading: Heading before it, to a whole turn [rad].
+    """
+    tables, state, known = flight.tables, flight.state, flight.scratch.known
+    x, dt = state.x, tables.dt
+    through, sideways, _ = level_motion(x)
+    share = wind_share(tables.wind, x[STATE.altitude])
+    along, across = wind_along(tables.wind, x[STATE.heading])
+    wind, right = share * along, sideways + share * across
+    before_ahead, before_right = known[KNOWN.ground_ahead], known[KNOWN.ground_right]
+    if before_right == 0.0 and right == 0.0:
+        # Air and wind apart: so the distance of straight flights is what it has always been to the last bit.
+        mean = 0.5 * (known[KNOWN.airspeed_in_air] + through) + 0.5 * (known[KNOWN.wind] + wind)
+    else:
+        mean = 0.5 * (level_speed(before_ahead, before_right) + level_speed(through + wind, right))
+    state.clock[CLOCK.distance] += dt * mean
+    sine, cosine = math.sin(heading), math.cos(heading)
+    north, east = before_ahead * cosine - before_right * sine, before_ahead * sine + before_right * cosine
+    sine, cosine = math.sin(x[STATE.heading]), math.cos(x[STATE.heading])
+    north += (through + wind) * cosine - right * sine
+    east += (through + wind) * sine + right * cosine
+    x[STATE.north] += dt * 0.5 * north
+    x[STATE.east] += dt * 0.5 * east
 
 
 @inner_kernel
@@ -396,16 +430,15 @@ def _end_code(flight: Flight) -> int:
     for i in range(x.shape[0]):
         if not math.isfinite(x[i]):
             return END.not_finite
-    pitch = x[STATE.pitch]
+    pitch, bank = x[STATE.pitch], x[STATE.bank]
     stands = tables.ground.active != 0.0
     if touches(tables.ground, x) if stands else x[STATE.altitude] < 0.0:
-        st, ct = math.sin(pitch), math.cos(pitch)
-        sink = x[STATE.w] * ct - x[STATE.u] * st
+        sink = -level_motion(x)[2]
         state.clock[CLOCK.sink] = sink
-        ground_speed = x[STATE.u] * ct + x[STATE.w] * st + tables.wind
-        upright = (
-            abs(pitch) <= LANDING_PITCH and state.nacelle[1] >= LANDING_NACELLE and abs(ground_speed) <= LANDING_SPEED
-        )
+        ahead, right = over_ground(tables.wind, x)
+        level = abs(pitch) <= LANDING_PITCH and abs(bank) <= LANDING_BANK
+        slow = abs(level_speed(ahead, right)) <= LANDING_SPEED
+        upright = level and slow and state.nacelle[1] >= LANDING_NACELLE
         if sink > (tables.ground.most_sink if stands else HARD_SINK_RATE) or not (upright or stands):
             return END.crash
         if not upright:
@@ -417,4 +450,6 @@ def _end_code(flight: Flight) -> int:
         return END.rotors_fast
     if not rotor_speed >= drive.lowest:
         return END.rotors_slow
+    if abs(bank) > LARGEST_BANK:
+        return END.bank
     return END.attitude if abs(pitch) > LARGEST_PITCH else END.none

@@ -8,6 +8,7 @@ from rtsim.aids.aids_kernels import AidTables
 from rtsim.aircraft.xv15.tables import Configuration, ControlTables
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.atmosphere.gust_kernels import GustTables
+from rtsim.atmosphere.wind_kernels import WindTables
 from rtsim.choices import PilotMode
 from rtsim.command import CHANNELS
 from rtsim.corridor.corridor_kernels import CorridorTables
@@ -34,14 +35,16 @@ coming frame needs and that is not compiled yet (1 + its place in ``PART``; 0 no
 REFERENCE = Places("airspeed", "rate")
 """The filtered airspeed reference [m/s] and its rate [m/s^2]."""
 END = Places(
-    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast", "aground"
+    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast",
+    "aground", "bank",
 )  # fmt: skip
 """Why a flight ended by itself."""
 END_REASONS = {
     END.none: "",
     END.crash: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
-    END.aground: "came to grief on the ground: pitch beyond 15 deg, nacelles below 60 deg or faster than 60 kn",
+    END.aground: "came to grief on the ground: pitch or bank beyond 15 deg, nacelles below 60 deg or faster than 60 kn",
     END.attitude: "control was lost: pitch attitude beyond 80 deg",
+    END.bank: "control was lost: bank beyond 120 deg",
     END.not_finite: "the model diverged: a state is no longer a finite number",
     END.gentle_landing: "touched down gently, sinking at {sink:.1f} m/s",
     END.hard_landing: "landed hard, sinking at {sink:.1f} m/s",
@@ -53,9 +56,10 @@ PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
 """Rows of the programme."""
 MOTION = Places("angle", "rate", "acceleration")
 """The nacelles now [rad, rad/s, rad/s^2]."""
-KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air", "place")
+KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air", "place", "wind", "ground_ahead", "ground_right")
 """Flap deflection of the schedule [rad]; airspeed of the programme at the end of the frame, and of the aircraft at its
-start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]."""
+start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]; wind along the heading, motion over the
+ground along it and to the right of it at the start of the frame [m/s]."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""
@@ -101,8 +105,8 @@ class SimulationTables(NamedTuple):
 
     dt: float
     """Length of a frame [s]."""
-    wind: float
-    """Tailwind [m/s]."""
+    wind: WindTables
+    """Steady wind."""
     plant: PlantTables
     """The aircraft."""
     nacelle: NacelleTables
@@ -212,8 +216,6 @@ class Scratch(NamedTuple):
     """Work array of the pilot kernels."""
     planned: FloatArray
     """Where failed actuators stand after the frame."""
-    gust: FloatArray
-    """Gust of the next frame in body axes."""
     sensors: FloatArray
     """What the protection law may know."""
     law: FloatArray

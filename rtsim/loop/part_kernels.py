@@ -9,6 +9,7 @@ from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST, gust_step
+from rtsim.atmosphere.wind_kernels import level_motion
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
@@ -110,11 +111,9 @@ def move_air(flight: Flight, elapsed: float, normals: FloatArray) -> float:
     """
     tables, state, x = flight.tables, flight.state, flight.state.x
     time = state.clock[CLOCK.frame] * tables.dt
-    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2)
-    altitude, pitch = x[STATE.altitude], x[STATE.pitch]
-    gust_step(
-        tables.gusts, state.gusts, speed, altitude, pitch, time, elapsed, normals, flight.scratch.gust
-    )  # fmt: skip
+    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2 + x[STATE.v] ** 2)
+    attitude = (x[STATE.pitch], x[STATE.bank])
+    gust_step(tables.gusts, state.gusts, speed, x[STATE.altitude], attitude, time, elapsed, normals)
     return 0.0
 
 
@@ -127,7 +126,7 @@ def schedule_faults(flight: Flight) -> float:
     """
     tables, state, x = flight.tables, flight.state, flight.state.x
     time = state.clock[CLOCK.frame] * tables.dt
-    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch]) + state.gusts[GUST.ahead]
+    airspeed = level_motion(x)[0] + state.gusts[GUST.ahead]
     fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
     return 0.0
 

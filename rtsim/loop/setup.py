@@ -28,7 +28,7 @@ from rtsim.aircraft.variables import (
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.air import gust_tables, new_gust_state
+from rtsim.atmosphere.air import gust_tables, new_gust_state, wind_tables
 from rtsim.atmosphere.specification import CALM, AirSpecification
 from rtsim.choices import CorridorName, PlantName, SwitchName
 from rtsim.command import SENSOR
@@ -56,7 +56,7 @@ from rtsim.loop.data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.loop.flying import Flying, Measure, new_streams
+from rtsim.loop.flying import Flying, Measure, new_normals, new_streams
 from rtsim.loop.options import FULL_ROTOR_SPEED, FULL_TANKS, FlightOptions, declared
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
@@ -230,20 +230,27 @@ def build_parts(setup: FlightSetup) -> Parts:
         if not nonlinear and not meets_ground(loaded):
             raise needed_inputs_error("ground", "on", "false", GROUND_INPUTS)
         altitude = max(altitude, light_on_wheels(ground, float(x[STATE.pitch])))
-    x[STATE.altitude] = altitude
+    x[STATE.altitude], x[STATE.heading] = altitude, options.heading
     programme = setup.programme
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
     pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
     lpv = None if nonlinear else _lpv_tables(database, options.plant)
+    rolls = nonlinear or hasattr(lpv, "symmetric")
     tables = SimulationTables(
         dt=dt,
-        wind=float(options.wind),
+        wind=wind_tables(
+            options.wind,
+            None if options.wind_from < 0.0 else options.wind_from,
+            heading=options.heading,
+            reference_height=options.wind_reference_height,
+            felt=rolls,
+        ),
         plant=PlantTables(
             aircraft=Address(own if nonlinear else lpv),
             configuration=own.configuration,
             controls=control_tables(profile),
             alpha_speed=scheduling_speed(database),
-            lateral=1 if nonlinear or hasattr(lpv, "symmetric") else 0,
+            lateral=int(rolls),
         ),
         nacelle=load_nacelle_tables(profile),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
@@ -312,7 +319,6 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         command=np.zeros((STATION.size, CHANNEL.size)),
         pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
         planned=np.zeros(3),
-        gust=np.zeros(3),
         sensors=np.zeros(SENSOR.size),
         law=np.zeros(WORK_SIZE),
         si=np.zeros(SIGNAL_COUNT),
@@ -366,7 +372,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     Args:
         setup: The flight.
         parts: Its parts.
-        air_normals: Three standard normals: the turbulence at the start.
+        air_normals: Six standard normals: the turbulence at the start.
     """
     options = setup.options
     airspeed, nacelle, _ = _start(setup)
@@ -443,7 +449,7 @@ def prepare(
     streams = new_streams(setup.options.seed)
     flying = Flying(
         parts.tables,
-        start_state(setup, parts, streams[1].standard_normal(3)),
+        start_state(setup, parts, new_normals(streams)),
         new_scratch(parts.tables),
         streams=streams,
         nonlinear=parts.nonlinear,
@@ -465,7 +471,7 @@ def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
         parts: Its parts.
     """
     flying.streams = new_streams(setup.options.seed)
-    flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
+    flying.take(start_state(setup, parts, new_normals(flying.streams)))
     flying.do(frames_of.DISTURB)
     flying.engage()
 

@@ -153,10 +153,25 @@ duration_s = 4.0
 [start]
 airspeed_kt = 80
 nacelle_deg = 75
+[flight]
+heading_deg = 120
+wind_kt = 12
+wind_from_deg = 200
+wind_reference_height_m = 10
 [air]
 turbulence = "moderate"
+lateral = true
 fade_in_s = 0.5
-gusts = [{ time_s = 1.0, below_kt = 6, length_m = 80 }, { time_s = 2.0, ahead_kt = -5, duration_s = 0, shape = "ramp" }]
+[[air.gusts]]
+time_s = 1.0
+below_kt = 6
+lateral_kt = 5
+length_m = 80
+[[air.gusts]]
+time_s = 2.0
+ahead_kt = -5
+duration_s = 0
+shape = "ramp"
 [[faults]]
 kind = "actuator-slow"
 actuator = "cyclic"
@@ -197,6 +212,11 @@ def test_scenario_to_log_to_replay(tmp_path):
     assert told == [("failure: cyclic slow", 250), ("mended: cyclic slow", 625), ("failure: engine limit", 750)]
     gust = record.rows[:, COLUMN.gust_w_m_s]
     assert np.ptp(gust) > kt(4.0)
+    assert np.ptp(record.rows[:, COLUMN.gust_v_m_s]) > kt(4.0)
+    assert record.rows[:, COLUMN.gust_r_deg_s].any()
+    wind = record.rows[0, [COLUMN.wind_north_m_s, COLUMN.wind_east_m_s]]
+    assert np.degrees(np.arctan2(-wind[1], -wind[0])) % 360.0 == pytest.approx(200.0)
+    assert np.hypot(*wind) > kt(12.0)  # at 100 m, given at 10 m
     result = replay_log(path)
     assert result.same, result.difference
 
