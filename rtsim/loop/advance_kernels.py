@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVERNOR, MEMORY
+from rtsim.aircraft.motion_kernels import moves_sideways
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
@@ -20,10 +21,12 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, MOTION, PART, PROGRAMME, REFERENCE, STATION, Flight
+from rtsim.loop.lateral_reference_kernels import move_lateral_reference
 from rtsim.loop.observe_kernels import programme_at, programmed
 from rtsim.nacelle.automatic_kernels import scheduled_angle
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
-from rtsim.pilot.layout_kernels import TARGET
+from rtsim.pilot.lateral_kernels import WANTED
+from rtsim.pilot.layout_kernels import S_FILTERED, TARGET
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
 from rtsim.systems.drive_kernels import (
@@ -61,10 +64,12 @@ def ask(flight: Flight) -> None:
     Args:
         flight: The flight as ``observe`` left it; its state does not change.
     """
-    state, command = flight.state, flight.scratch.command
+    tables, state, command = flight.tables, flight.state, flight.scratch.command
     pilot = command[STATION.pilot]
     if state.clock[CLOCK.mode] == MODE.mocm:
         call_at(flight.parts[PART.ask], flight)
+        if flight.parts[PART.ask_lateral] != 0 and lateral_awake(flight):
+            call_at(flight.parts[PART.ask_lateral], flight, tables.lateral_pilot)
     else:
         pilot[CHANNEL.stick] = state.u[INPUT.stick]
         pilot[CHANNEL.lever] = state.u[INPUT.lever]
@@ -73,6 +78,40 @@ def ask(flight: Flight) -> None:
         pilot[CHANNEL.pedal] = state.u[INPUT.pedal]
     for channel in range(CHANNEL.size):
         command[STATION.hands, channel] = pilot[channel]
+
+
+@inner_kernel
+def lateral_wakes(flight: Flight) -> bool:
+    """Whether the pilot's lateral half may have something to do in the frame that begins.
+
+    Args:
+        flight: The flight at the start of a frame.
+    """
+    tables, state = flight.tables, flight.state
+    if tables.plant.lateral == 0:
+        return False
+    return tables.lateral_noise != 0 or tables.lateral_asked != 0 or moves_sideways(state.x, state.u)
+
+
+@inner_kernel
+def lateral_awake(flight: Flight) -> bool:
+    """Whether the pilot's lateral half has anything to do: else it gives zero, as it would, without being asked.
+
+    Args:
+        flight: The flight as ``observe`` left it.
+    """
+    state, scratch = flight.state, flight.scratch
+    if flight.tables.lateral_noise != 0 or moves_sideways(state.x, state.u):
+        return True
+    wanted = scratch.wanted
+    if wanted[WANTED.turn_rate] != 0.0 or wanted[WANTED.turn_jerk] != 0.0 or wanted[WANTED.lateral_velocity] != 0.0:
+        return True
+    if wanted[WANTED.lateral_acceleration] != 0.0 or wanted[WANTED.heading] != state.x[STATE.heading]:
+        return True
+    awake = wanted[WANTED.turn_acceleration] != 0.0
+    for k in range(S_FILTERED + 1, state.lateral_pilot.shape[0]):
+        awake = awake or state.lateral_pilot[k] != 0.0
+    return awake
 
 
 @inner_kernel
@@ -253,7 +292,16 @@ def move_pilot(flight: Flight, normals: FloatArray) -> None:
         normals: Standard normals of the pilot's noise; none: no noise.
     """
     if flight.state.clock[CLOCK.mode] == MODE.mocm:
-        call_at(flight.parts[PART.advance], flight, normals)
+        tables, state = flight.tables, flight.state
+        own = tables.pilot.roles.displays + tables.pilot.roles.hands
+        noisy = normals.shape[0] > 0
+        call_at(flight.parts[PART.advance], flight, normals[:own] if noisy else normals)
+        if tables.plant.lateral != 0:
+            if flight.parts[PART.advance_lateral] != 0 and lateral_awake(flight):
+                rest = normals[own:] if noisy else normals
+                call_at(flight.parts[PART.advance_lateral], flight, tables.lateral_pilot, rest)
+            else:
+                state.lateral_pilot[S_FILTERED] = flight.scratch.shown[0]
     if flight.tables.automatic.active != 0:
         call_at(flight.parts[PART.automatic_advance], flight)
 
@@ -376,6 +424,10 @@ def move_reference(flight: Flight) -> None:
     )
     state.reference[REFERENCE.airspeed] = value
     state.reference[REFERENCE.rate] = value_rate
+    if tables.plant.lateral != 0:
+        known = scratch.known
+        asked = known[KNOWN.asked], known[KNOWN.asked + 1], known[KNOWN.asked + 2], known[KNOWN.asked + 3]
+        move_lateral_reference(state.reference, asked, state.x, known[KNOWN.wind_right], dt)
     state.clock[CLOCK.frame] += 1.0
 
 

@@ -7,12 +7,13 @@ frame that the flight needs is compiled when it is first needed, before the fram
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtsim.aircraft.variables import INPUT
+from rtsim.aircraft.variables import INPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.dryden_kernels import TURBULENCE
 from rtsim.atmosphere.gust_kernels import NORMALS_PER_FRAME
@@ -28,6 +29,7 @@ from rtsim.loop.data import (
     KNOWN,
     MOTION,
     PART,
+    REFERENCE,
     Flight,
     Scratch,
     SimulationState,
@@ -35,7 +37,15 @@ from rtsim.loop.data import (
 )
 from rtsim.loop.loading import entry_of, load_part, part_address
 from rtsim.pilot.engage_kernels import mocm_engage
-from rtsim.random_streams import STREAM_LATERAL_TURBULENCE, STREAM_PILOT, STREAM_TURBULENCE, stream_generator
+from rtsim.pilot.lateral_kernels import lateral_engage
+from rtsim.pilot.layout_kernels import noise_width as noise_width_of
+from rtsim.random_streams import (
+    STREAM_LATERAL_PILOT,
+    STREAM_LATERAL_TURBULENCE,
+    STREAM_PILOT,
+    STREAM_TURBULENCE,
+    stream_generator,
+)
 
 WHOLE, COMPLETE = frames_of.WHOLE, frames_of.COMPLETE
 NO_ROWS = np.zeros(0)
@@ -44,7 +54,7 @@ _STILL = np.zeros((1, 2 * NORMALS_PER_FRAME))
 """Normals of the air where no time passes."""
 BLOCK = 2_048
 """Frames for which noise is drawn at a time in a flight that keeps no rows."""
-_ENGAGE = interpreted(mocm_engage)
+_ENGAGE, _ENGAGE_LATERAL = interpreted(mocm_engage), interpreted(lateral_engage)
 Measure = Callable[[Any], float]
 """A compiled part that looks at ``flight.scratch.row`` after each frame and adds to ``flight.measures``."""
 
@@ -58,6 +68,8 @@ class Streams(NamedTuple):
     """Turbulence in the plane of symmetry."""
     side: np.random.Generator
     """Turbulence out of it."""
+    hands: np.random.Generator
+    """Noise of the pilot's lateral half."""
 
 
 def new_streams(seed: int) -> Streams:
@@ -66,7 +78,7 @@ def new_streams(seed: int) -> Streams:
     Args:
         seed: Root of every random stream.
     """
-    numbers = (STREAM_PILOT, STREAM_TURBULENCE, STREAM_LATERAL_TURBULENCE)
+    numbers = (STREAM_PILOT, STREAM_TURBULENCE, STREAM_LATERAL_TURBULENCE, STREAM_LATERAL_PILOT)
     return Streams(*(stream_generator(seed, number) for number in numbers))
 
 
@@ -171,6 +183,9 @@ class Flying:
         if stages & COMPLETE or frames > 1:
             if self.noise_width:
                 noise = self.streams.pilot.standard_normal((frames, self.noise_width))
+                if self.tables.lateral_noise:
+                    width = interpreted(noise_width_of)(self.tables.lateral_pilot.target.mocm)
+                    noise = np.hstack([noise, self.streams.hands.standard_normal((frames, width))])
             if self._gusts.item(TURBULENCE.active):
                 air = self.streams.air.standard_normal((frames, NORMALS_PER_FRAME))
                 if self._gusts.item(TURBULENCE.lateral):
@@ -221,11 +236,21 @@ class Flying:
 
         Done in interpreted kernels: it happens once in a flight, and compiling it takes longer than a thousand times.
         """
-        self.do(frames_of.OBSERVE)
         tables, state, scratch = self.tables, self.state, self.scratch
+        if tables.plant.lateral:  # what it is asked for begins with how the aircraft moves, and leads on from there
+            x = state.x
+            turning = x[STATE.q] * math.sin(x[STATE.bank]) + x[STATE.r] * math.cos(x[STATE.bank])
+            state.reference[[REFERENCE.heading, REFERENCE.turn_rate]] = x[STATE.heading], turning
+            state.reference[[REFERENCE.turn_acceleration, REFERENCE.lateral_rate, REFERENCE.on_track]] = 0.0
+            state.reference[REFERENCE.lateral] = x[STATE.v]
+        self.do(frames_of.OBSERVE)
         present = np.array([state.u[INPUT.stick], state.u[INPUT.lever]])
         place, rate = float(scratch.known[KNOWN.place]), float(scratch.motion[MOTION.rate])
         _ENGAGE(tables.pilot, state.pilot, scratch.seen, place, rate, scratch.target, present)
+        if tables.plant.lateral:
+            hands = np.array([state.u[INPUT.lateral_stick], state.u[INPUT.pedal]])
+            pilot, airspeed = tables.lateral_pilot.target, float(scratch.shown[0])
+            _ENGAGE_LATERAL(pilot, state.lateral_pilot, state.x, place, airspeed, scratch.wanted, hands)
 
     def take(self, state: SimulationState) -> None:
         """Take another state.

@@ -17,13 +17,16 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.parts import call_at
 from rtsim.loop.data import CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Flight
+from rtsim.loop.lateral_reference_kernels import fill_wanted, turn_wanted
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
+from rtsim.pilot.lateral_kernels import WANTED
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.systems.drive_kernels import DEVIATION, HELD_OFFSET, engine_power, rotor_speed_now, schedule_angle
 from rtsim.systems.engine_kernels import TANK, advance_ratio, fuel_flow, takeoff_power, thrust_over_solidity
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
 from rtsim.systems.ground_kernels import ground_contact, ground_effect
+from rtsim.units import GRAVITY
 
 STANDSTILL = 0.05
 """Motion over the ground that has no course [m/s]."""
@@ -102,6 +105,7 @@ def observe(flight: Flight) -> None:
     ground_ahead, ground_right = through + share * wind_ahead, sideways + share * wind_right
     scratch.known[KNOWN.airspeed_in_air] = through
     scratch.known[KNOWN.wind] = share * wind_ahead
+    scratch.known[KNOWN.wind_right] = share * wind_right
     scratch.known[KNOWN.ground_ahead], scratch.known[KNOWN.ground_right] = ground_ahead, ground_right
     if tables.ground.active != 0.0:
         total = math.sqrt(speed**2 + (x[STATE.v] + gusts[GUST.v]) ** 2) if x[STATE.v] + gusts[GUST.v] != 0.0 else speed
@@ -272,6 +276,20 @@ def _ask(flight: Flight, time: float) -> None:
     if tables.automatic.active != 0:
         wanted_rate = call_at(flight.parts[PART.automatic_rate], flight)
     target[TARGET.nacelle_rate] = nacelle_assigned_rate(tables.nacelle, wanted_rate)
+    if tables.plant.lateral != 0:
+        _ask_sideways(flight, now, now_share)
+
+
+@inner_kernel
+def _ask_sideways(flight: Flight, low: int, share: float) -> None:
+    """Fill what the pilot's lateral half is asked for, and the load factor of the turn for the other half."""
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    asked = turn_wanted(tables.programme, low, share)
+    for k in range(len(asked)):
+        scratch.known[KNOWN.asked + k] = asked[k]
+    fill_wanted(state.reference, asked, state.x, scratch.known[KNOWN.wind_right], scratch.wanted)
+    slope = max(scratch.wanted[WANTED.airspeed], 0.0) * scratch.wanted[WANTED.turn_rate] / GRAVITY
+    scratch.target[TARGET.turn_excess] = math.sqrt(1.0 + slope * slope) - 1.0
 
 
 @inner_kernel
@@ -300,6 +318,11 @@ def _see(flight: Flight, airspeed: float) -> None:
         seen[STATE.u] += shift * math.cos(x[STATE.pitch])
         seen[STATE.v] += upright * sine + right * cosine
         seen[STATE.w] += upright * cosine - right * sine
+    if x[STATE.bank] != 0.0:
+        # Pitch, airspeed and climb are read in the vertical plane, whatever the bank.
+        sine, cosine = math.sin(x[STATE.bank]), math.cos(x[STATE.bank])
+        seen[STATE.w] = seen[STATE.v] * sine + seen[STATE.w] * cosine
+        seen[STATE.q] = x[STATE.q] * cosine - x[STATE.r] * sine
 
 
 @inner_kernel

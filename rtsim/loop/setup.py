@@ -49,6 +49,7 @@ from rtsim.loop.data import (
     KNOWN,
     MODES,
     MOTION,
+    REFERENCE,
     STATION,
     PlantTables,
     Scratch,
@@ -72,10 +73,12 @@ from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.nacelle.switch import load_nacelle_tables
+from rtsim.pilot.lateral_kernels import WANTED, lateral_work_size
+from rtsim.pilot.lateral_tables import load_lateral_pilot
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
-from rtsim.programme import Programme, ProgrammePoint
+from rtsim.programme import LATERAL_ROWS, Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
 from rtsim.protection.law_data import LAW, WORK_SIZE, ProtectionTables
@@ -256,6 +259,9 @@ def build_parts(setup: FlightSetup) -> Parts:
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
         corridor=_corridor_tables(corridor, database),
         pilot=pilot,
+        lateral_noise=int(rolls and options.pilot_noise),
+        lateral_asked=int(not programme.symmetric),
+        lateral_pilot=Address(load_lateral_pilot(database, dt=dt) if rolls else pilot),
         flaps=load_flap_tables(profile),
         drive=drive,
         ground=ground,
@@ -265,7 +271,15 @@ def build_parts(setup: FlightSetup) -> Parts:
         faults=fault_tables(setup.faults, profile),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
         protection=_law(compiled_law(load_laws(options.protection)) or "monitor", corridor, database, dt),
-        programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
+        programme=np.array(
+            [
+                programme.time,
+                programme.airspeed,
+                programme.nacelle_angle,
+                programme.altitude,
+                *(getattr(programme, name) for name in LATERAL_ROWS),
+            ]
+        ),
         script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
         units=UNIT_SCALES,
         reference_frequency=REFERENCE_FREQUENCY,
@@ -318,12 +332,22 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         target=np.zeros(TARGET.size),
         command=np.zeros((STATION.size, CHANNEL.size)),
         pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
+        lateral_pilot=np.zeros(_lateral_sizes(tables)[1]),
+        wanted=np.zeros(WANTED.size),
         planned=np.zeros(3),
         sensors=np.zeros(SENSOR.size),
         law=np.zeros(WORK_SIZE),
         si=np.zeros(SIGNAL_COUNT),
         row=np.zeros(SIGNAL_COUNT),
     )
+
+
+def _lateral_sizes(tables: SimulationTables) -> tuple[int, int]:
+    """Lengths of state and work array of the pilot's lateral half."""
+    if tables.plant.lateral == 0:
+        return 1, 1
+    pilot = tables.lateral_pilot.target
+    return interpreted(pilot_state_size)(pilot.mocm), interpreted(lateral_work_size)(pilot)
 
 
 def _needed_aids(setup: FlightSetup, database: Database) -> tuple[SwitchName, ...]:
@@ -387,9 +411,10 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         u=u,
         nacelle=new_actuator_state(nacelle),
         automatic=np.zeros(AUTOMATIC_STATE_SIZE),
-        reference=np.array([airspeed, 0.0]),
+        reference=_start_reference(airspeed, options.heading),
         level=new_level_state(),
         pilot=np.zeros(interpreted(pilot_state_size)(parts.tables.pilot)),
+        lateral_pilot=np.zeros(_lateral_sizes(parts.tables)[0]),
         aids=np.zeros(MEMORY.size),
         switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
@@ -411,6 +436,12 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     if options.aids:
         state.aids[MEMORY.last_switches] = -1.0  # engaged in the first frame, from the trim
     return state
+
+
+def _start_reference(airspeed: float, heading: float) -> FloatArray:
+    reference = np.zeros(REFERENCE.size)
+    reference[REFERENCE.airspeed], reference[REFERENCE.heading] = airspeed, heading
+    return reference
 
 
 def _tank(fuel: float, capacity: float) -> FloatArray:
