@@ -154,7 +154,8 @@ class Sensors:
     heading: float = 0.0
     """Heading, clockwise from north, 0 to 2 pi [rad]."""
     sideslip: float = 0.0
-    """Sideslip, wind from the right positive; defined in hover too (docs/architecture.md) [rad]."""
+    """Sideslip with gusts, wind from the right positive: atan2(v, sqrt(u^2 + w^2 + V0^2)), V0 as for scheduling,
+    4.5 m/s: defined in hover too [rad]."""
     lateral_velocity: float = 0.0
     """Sideways airspeed in the horizontal plane, right positive [m/s]."""
     lateral_acceleration: float = 0.0
