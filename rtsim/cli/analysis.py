@@ -215,10 +215,8 @@ def _print_model(result: dict[str, Any]) -> None:
         verdict = "stable" if result["stable"] else "unstable"
         results.print(f"The loop as flown is {verdict}: slowest growth {result['growth_rad_s']:+.4f} rad/s")
     for hand, margin in result.get("margins", {}).items():
-        results.print(
-            f"Margins of {hand.replace('_', ' ')}: {margin['phase_deg']:.0f} deg at {margin['crossover_rad_s']:.2f} rad/s, "
-            f"{margin['gain_db']:.1f} dB"
-        )
+        phase = f"{margin['phase_deg']:.0f} deg at {margin['crossover_rad_s']:.2f} rad/s"
+        results.print(f"Margins of {hand.replace('_', ' ')}: {phase}, {margin['gain_db']:.1f} dB")
     for kind in ("states", "inputs", "outputs"):
         if result[kind]:
             named = [pair for pair in zip(result[kind], result["units"][kind], strict=True) if pair[0][:6] != "pilot_"]
