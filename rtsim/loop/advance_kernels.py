@@ -315,7 +315,7 @@ def move_plant(flight: Flight) -> None:
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     x, u, dt = state.x, state.u, tables.dt
-    acting = scratch.command[STATION.acting]
+    acting, heading = scratch.command[STATION.acting], x[STATE.heading]
     rate = acting[CHANNEL.nacelle_rate]
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = acting[CHANNEL.stick]
@@ -336,7 +336,7 @@ def move_plant(flight: Flight) -> None:
         fault_actuators_end(scratch.planned, x)
     if tables.wind.reference_height != 0.0:
         meet_wind(tables.wind, x, scratch.si[QUANTITY.altitude])
-    _move_place(flight, scratch.si[QUANTITY.heading])
+    _move_place(flight, heading)
     nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
 
 
@@ -346,7 +346,7 @@ def _move_place(flight: Flight, heading: float) -> None:
 
     Args:
         flight: The flight after the step of its plant.
-        heading: Heading before it, to a whole turn [rad].
+        heading: Heading before it [rad].
     """
     tables, state, known = flight.tables, flight.state, flight.scratch.known
     x, dt = state.x, tables.dt

@@ -319,8 +319,8 @@ def _see(flight: Flight, airspeed: float) -> None:
         seen[STATE.v] += upright * sine + right * cosine
         seen[STATE.w] += upright * cosine - right * sine
     if x[STATE.bank] != 0.0:
-        # Airspeed and climb are read in the vertical plane, whatever the bank; of the pitch rate what the turn asked for
-        # does not need.
+        # Airspeed and climb are read in the vertical plane, whatever the bank; of the pitch rate what the turn that is
+        # asked for does not need.
         sine, cosine = math.sin(x[STATE.bank]), math.cos(x[STATE.bank])
         seen[STATE.w] = seen[STATE.v] * sine + seen[STATE.w] * cosine
         seen[STATE.q] = x[STATE.q] - state.reference[REFERENCE.turn_rate] * math.cos(x[STATE.pitch]) * sine
