@@ -232,7 +232,16 @@ def _subtract_rigid_body(database: Database, x_ref: FloatArray, A: FloatArray, x
 
 
 def active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDArray[np.int64], ...]:
-    """Rows and columns that are not zero in every cell."""
+    """Rows and columns that are not zero in every cell.
+
+    Args:
+        A: State matrices (..., n, n).
+        B: Input matrices (..., n, m).
+        xdot_ref: State derivatives at the trims (..., n).
+
+    Returns:
+        Numbers of the active rows, columns of A and columns of B.
+    """
     grid = tuple(range(A.ndim - 2))
     used_a, used_b = np.any(A != 0.0, axis=grid), np.any(B != 0.0, axis=grid)
     rows = used_a.any(axis=1) | used_b.any(axis=1) | np.any(xdot_ref != 0.0, axis=grid)
@@ -241,17 +250,30 @@ def active(A: FloatArray, B: FloatArray, xdot_ref: FloatArray) -> tuple[npt.NDAr
 
 
 def padded_rows(rows: int) -> int:
-    """Rows of a column in the packed cells: at least four, a multiple of four."""
+    """Rows of a column in the packed cells: at least four, a multiple of four.
+
+    Args:
+        rows: Active rows.
+    """
     return max(4, -(-rows // 4) * 4)
 
 
 def columns_of(matrix: FloatArray, padded: int) -> FloatArray:
-    """Flatten (..., rows, columns) column after column, each padded with zeros."""
+    """Flatten (..., rows, columns) column after column, each padded with zeros.
+
+    Args:
+        matrix: Matrices (..., rows, columns).
+        padded: Length of a column.
+    """
     filled = np.zeros((*matrix.shape[:-2], matrix.shape[-1], padded))
     filled[..., : matrix.shape[-2]] = np.swapaxes(matrix, -1, -2)
     return filled.reshape(*matrix.shape[:-2], -1)
 
 
 def layers_last(array: FloatArray) -> FloatArray:
-    """Reorder [layer, airspeed, nacelle, ...] to [airspeed, nacelle, layer, ...]: a cell's layers lie side by side."""
+    """Reorder [layer, airspeed, nacelle, ...] to [airspeed, nacelle, layer, ...]: a cell's layers lie side by side.
+
+    Args:
+        array: An array with the layers first.
+    """
     return np.ascontiguousarray(np.moveaxis(array, 0, 2))
