@@ -95,6 +95,18 @@ def beside_line(reference: FloatArray, x: FloatArray) -> float:
 
 
 @inner_kernel
+def from_point(reference: FloatArray, x: FloatArray) -> float:
+    """Distance from the line's point [m].
+
+    Args:
+        reference: ``REFERENCE``.
+        x: Aircraft state: where it is.
+    """
+    ahead, right = _from_point(reference, x, 0.0)
+    return math.sqrt(ahead * ahead + right * right)
+
+
+@inner_kernel
 def _from_point(reference: FloatArray, x: FloatArray, direction: float) -> tuple[float, float]:
     """Place ahead of the line's point and to the right of it, seen in a direction [m]."""
     north, east = x[STATE.north] - reference[REFERENCE.line_north], x[STATE.east] - reference[REFERENCE.line_east]

@@ -145,10 +145,10 @@ def slip_trim(
             if node < 0 or part == 0.0:  # the level trim, from which the changes are counted
                 continue
             exists &= bool(data.slip_valid[node, *at])
-            for change, slip, ref in ((x, data.slip_x_ref, database.x_ref), (u, data.slip_u_ref, database.u_ref)):
-                width = ref.shape[-1]
-                change += part * slip[node, *at]
-                change[:width] -= part * ref[level, *at]
+            x += part * data.slip_x_ref[node, *at]
+            u += part * data.slip_u_ref[node, *at]
+            x[: database.x_ref.shape[-1]] -= part * database.x_ref[level, *at]
+            u[: database.u_ref.shape[-1]] -= part * database.u_ref[level, *at]
     if lateral < 0.0:  # its mirror image
         x[database.x_ref.shape[-1] :] *= -1.0
         u[database.u_ref.shape[-1] :] *= -1.0
