@@ -329,6 +329,7 @@ def move_plant(flight: Flight) -> None:
         for row in range(3):
             scratch.path[row, 0] = scratch.known[KNOWN.place]
     _turn_systems(flight)
+    heading = x[STATE.heading]
     state.clock[CLOCK.flags] = call_at(
         flight.parts[PART.step], tables.plant.aircraft, x, u, scratch.path, dt, scratch.work
     )
@@ -336,7 +337,7 @@ def move_plant(flight: Flight) -> None:
         fault_actuators_end(scratch.planned, x)
     if tables.wind.reference_height != 0.0:
         meet_wind(tables.wind, x, scratch.si[QUANTITY.altitude])
-    _move_place(flight, scratch.si[QUANTITY.heading])
+    _move_place(flight, heading)
     nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
 
 
@@ -346,7 +347,7 @@ def _move_place(flight: Flight, heading: float) -> None:
 
     Args:
         flight: The flight after the step of its plant.
-        heading: Heading before it, to a whole turn [rad].
+        heading: Heading before it [rad].
     """
     tables, state, known = flight.tables, flight.state, flight.scratch.known
     x, dt = state.x, tables.dt
