@@ -30,6 +30,10 @@ HEADING_TURN_RATE = 12.0 * DEGREE
 """Fastest turn onto a heading [rad/s]: in hover a turn needs no bank."""
 LINE_RATE = 0.12
 """Rate at which the pilot closes in on his line [1/s]."""
+ON_LINE, TURNS_ONTO = 1.0, 2.0
+"""Whether the line is held, or the flight still turns onto its course."""
+ALIGNED = 3.0 * DEGREE
+"""So near the heading along the line the line begins, where the aircraft is [rad]."""
 LARGEST_CUT = 20.0 * DEGREE
 """Largest angle between heading and line [rad]."""
 LARGEST_CLOSING = 3.0
@@ -115,9 +119,20 @@ def _from_point(reference: FloatArray, x: FloatArray, direction: float) -> tuple
 
 
 @inner_kernel
-def _by_heading(speed: float) -> float:
-    """Share of the line that is held by the heading."""
+def line_by_heading(speed: float) -> float:
+    """Share of the line that is held by the heading.
+
+    Args:
+        speed: Airspeed [m/s].
+    """
     return min(max((speed - BY_HEADING[0]) / (BY_HEADING[1] - BY_HEADING[0]), 0.0), 1.0)
+
+
+@inner_kernel
+def _cut(speed: float, off: float, wind_right: float) -> float:
+    """Angle between heading and line that keeps to the line, or leads back to it [rad]."""
+    drift = math.asin(min(max(wind_right / speed, -0.5), 0.5))
+    return -line_by_heading(speed) * min(max(math.atan(LINE_RATE * off / speed) + drift, -LARGEST_CUT), LARGEST_CUT)
 
 
 @inner_kernel
@@ -152,12 +167,11 @@ def _asked(
     cut = 0.0
     if track != 0.0:
         off = 0.0
-        if reference[REFERENCE.on_track] != 0.0:
+        if reference[REFERENCE.on_track] == ON_LINE:
             standing = reference[REFERENCE.standing] != 0.0
             off = _from_point(reference, x, x[STATE.heading])[1] if standing else beside_line(reference, x)
-        by_heading = _by_heading(speed)
-        drift = math.asin(min(max(wind_right / speed, -0.5), 0.5))
-        cut = -by_heading * min(max(math.atan(LINE_RATE * off / speed) + drift, -LARGEST_CUT), LARGEST_CUT)
+        by_heading = line_by_heading(speed)
+        cut = _cut(speed, off, wind_right)
         lateral -= (1.0 - by_heading) * (wind_right + _closing(off))
     onto = kind == TURN.heading or (track != 0.0 and value == 0.0)
     if onto:
@@ -233,19 +247,26 @@ def _follow(reference: FloatArray, place: int, rate_place: int, goal: float, dt:
 def _keep_line(
     reference: FloatArray, asked: tuple[float, float, float, float], x: FloatArray, wind_right: float, dt: float
 ) -> None:
-    """Begin the line over the ground, turn it, and move it to the right as fast as is asked for."""
+    """Begin the line over the ground, turn it, and move it to the right as fast as is asked for.
+
+    A line that is held by the heading begins where the aircraft has turned onto it.
+    """
     if asked[3] == 0.0:
         reference[REFERENCE.on_track] = 0.0
         return
-    by_heading = _by_heading(reference[REFERENCE.airspeed])
+    speed = max(reference[REFERENCE.airspeed], 1.0)
+    by_heading = line_by_heading(speed)
     course, begins = _course(reference, asked), reference[REFERENCE.on_track] == 0.0
-    if begins or (by_heading > 0.0 and course != reference[REFERENCE.line_course]):
+    astray = abs(_nearest(course + _cut(speed, 0.0, wind_right) - reference[REFERENCE.heading]))
+    turns = course != reference[REFERENCE.line_course] or reference[REFERENCE.on_track] == TURNS_ONTO or begins
+    turns = turns and by_heading > 0.0 and astray > ALIGNED
+    if begins or turns:
         reference[REFERENCE.line_north], reference[REFERENCE.line_east] = x[STATE.north], x[STATE.east]
     if begins:
         reference[REFERENCE.line_lateral] = reference[REFERENCE.lateral] + wind_right
         reference[REFERENCE.line_lateral_rate] = reference[REFERENCE.lateral_rate]
         reference[REFERENCE.standing] = 0.0
-    reference[REFERENCE.on_track], reference[REFERENCE.line_course] = 1.0, course
+    reference[REFERENCE.on_track], reference[REFERENCE.line_course] = TURNS_ONTO if turns else ON_LINE, course
     _follow(reference, REFERENCE.line_lateral, REFERENCE.line_lateral_rate, asked[2], dt)
     way = (1.0 - by_heading) * dt * reference[REFERENCE.line_lateral]
     reference[REFERENCE.line_north] -= way * math.sin(reference[REFERENCE.heading])

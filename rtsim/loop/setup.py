@@ -59,6 +59,7 @@ from rtsim.loop.data import (
     SimulationTables,
 )
 from rtsim.loop.flying import Flying, Measure, new_normals, new_streams
+from rtsim.loop.lateral_reference_kernels import line_by_heading
 from rtsim.loop.options import FULL_ROTOR_SPEED, FULL_TANKS, FlightOptions, declared
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
@@ -160,7 +161,7 @@ def _start(setup: FlightSetup) -> tuple[float, float, float]:
 
 
 def _start_lateral(programme: Programme, wind: WindTables, altitude: float) -> float:
-    """Airspeed to the right at the start: that asked for; on a track without the wind, for then it is over the ground.
+    """Airspeed to the right at the start: that asked for; on a track that is held by sideward flight, over the ground.
 
     Args:
         programme: What is asked for.
@@ -171,7 +172,8 @@ def _start_lateral(programme: Programme, wind: WindTables, altitude: float) -> f
     lateral = float(programme.lateral[0])
     if programme.track[first] == 0.0:
         return lateral
-    return lateral - interpreted(wind_share)(wind, altitude) * wind.right
+    by_flying_sideward = 1.0 - interpreted(line_by_heading)(max(float(programme.airspeed[0]), 1.0))
+    return lateral - by_flying_sideward * interpreted(wind_share)(wind, altitude) * wind.right
 
 
 @functools.lru_cache(maxsize=16)

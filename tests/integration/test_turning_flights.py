@@ -144,3 +144,15 @@ def test_starts_that_have_no_trim_sideward_are_refused() -> None:
 def test_an_aircraft_without_a_lateral_half_does_not_turn() -> None:
     with pytest.raises(InputError, match="plane of symmetry alone"):
         flown(TURNS["turn"](1.0), 1.0, plant="lpv-plain")
+
+
+def test_a_line_begins_where_the_flight_has_turned_onto_it() -> None:
+    """At 80 kn, across 10 kn of wind: the nose points into the wind, the course is the line's."""
+    kind = TURN.heading
+    asked = programme(80, 75, (0, kind, 0, 0), (4, kind, 0, 0), (4.1, kind, 40, 0), (50, kind, 40, 0), track=1.0)
+    rows = flown(asked, 50.0, wind=kt(10.0), wind_from=deg(130.0))
+    assert abs(rows[0, COLUMN.lateral_kt]) < 1e-9  # at speed the heading holds the line
+    assert np.abs(rows[:, COLUMN.track_error_m]).max() < 25.0
+    assert abs(rows[-1, COLUMN.track_error_m]) < 5.0
+    assert rows[-1, COLUMN.track_deg] == pytest.approx(40.0, abs=0.5)
+    assert rows[-1, COLUMN.heading_deg] == pytest.approx(40.0 + np.rad2deg(np.arcsin(10.0 / 80.0)), abs=0.5)
