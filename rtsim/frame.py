@@ -220,6 +220,11 @@ SIGNALS: tuple[Signal, ...] = (
         "Limit that changed the lateral stick, by the same numbers.",
     ),
     Signal("protection_pedal_reason", "", "protection", "Limit that changed the pedals, by the same numbers."),
+    Signal("bank_reference_deg", "deg", "attitude", "Bank of the coordinated turn asked for, after its filter."),
+    Signal("heading_reference_deg", "deg", "course", "Heading asked for, after its filter, 0 to 360."),
+    Signal("lateral_reference_kt", "kn", "speed", "Sideways airspeed asked for along body y, after its filter."),
+    Signal("track_error_m", "m", "position", "Place to the right of the line over the ground that is held; 0: none."),
+    Signal("point_error_m", "m", "position", "Distance from the point over the ground that is held; 0: none."),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

@@ -43,6 +43,7 @@ DEGREE = math.pi / 180.0
 RPM = 2.0 * math.pi / 60.0
 """One revolution per minute [rad/s]."""
 STICK_HALF_TRAVEL_IN = 4.8
+PEDAL_HALF_TRAVEL_IN = 2.5
 """Longitudinal stick travel from neutral to either stop [in], NASA CR-166536."""
 
 

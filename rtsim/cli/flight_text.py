@@ -233,7 +233,7 @@ def _print_metrics(summary: dict[str, Any]) -> None:
         ("Fuel", f"{summary['fuel_lb']['used']:.1f} lb used", ""),
         ("Corridor", f"worst margin {corridor['worst_margin_kt']:.1f} kn", outside),
     )
-    for name, result, details in rows:
+    for name, result, details in (*rows, *_sideways_rows(summary)):
         say(f"{name:9} {result:25} {details}".rstrip())
     _print_limits(summary.get("limits", {}))
     acted = summary.get("interventions", {})
@@ -242,6 +242,25 @@ def _print_metrics(summary: dict[str, Any]) -> None:
         seconds = {name: acted[f"{name.replace(' ', '_')}_s"] for name in _CONTROLS}
         on = [f"{name} {spent:.1f} s" for name, spent in seconds.items() if spent]
         say(f"Protection {times}: {', '.join(on)}")
+
+
+def _sideways_rows(summary: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """How it turned, slipped and went sideward, where it did."""
+    bank, heading, stick, pedal = (summary[name] for name in ("bank_deg", "heading_deg", "lateral_stick", "pedal"))
+    place, slip = summary["position_m"], f"sideslip {summary['sideslip_deg']['max']:.1f} deg at most"
+    if not (summary["lateral_kt"]["max"] or bank["min"] or bank["max"] or stick["travel_in"] or pedal["travel_in"]):
+        return []
+    banked = f"error {bank['rms_error']:.2f} deg rms, {bank['max_error']:.2f} deg at most; {slip}"
+    where = f"{place['north']:.1f} m north, {place['east']:.1f} m east"
+    line = (
+        f"; {summary['track_m']['max_error']:.1f} m beside the line at most" if summary["track_m"]["max_error"] else ""
+    )
+    return [
+        ("Bank", f"{bank['min']:.1f} to {bank['max']:.1f} deg", banked),
+        ("Heading", f"final {heading['final']:.1f} deg", f"error {heading['max_error']:.2f} deg at most"),
+        ("Sideways", f"{summary['lateral_kt']['max']:.1f} kn at most", where + line),
+        ("Hands", f"lateral stick {stick['peak_in']:.2f} in", f"pedals {pedal['peak_in']:.2f} in at most"),
+    ]
 
 
 def _print_limits(limits: Mapping[str, Mapping[str, Any]]) -> None:

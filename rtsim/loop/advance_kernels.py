@@ -21,7 +21,7 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, MOTION, PART, PROGRAMME, REFERENCE, STATION, Flight
-from rtsim.loop.lateral_reference_kernels import move_lateral_reference
+from rtsim.loop.lateral_reference_kernels import move_lateral_reference, stand_still
 from rtsim.loop.observe_kernels import programme_at, programmed
 from rtsim.nacelle.automatic_kernels import scheduled_angle
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
@@ -329,6 +329,7 @@ def move_plant(flight: Flight) -> None:
         for row in range(3):
             scratch.path[row, 0] = scratch.known[KNOWN.place]
     _turn_systems(flight)
+    heading = x[STATE.heading]
     state.clock[CLOCK.flags] = call_at(
         flight.parts[PART.step], tables.plant.aircraft, x, u, scratch.path, dt, scratch.work
     )
@@ -414,6 +415,9 @@ def move_reference(flight: Flight) -> None:
     tables, state, scratch, dt = flight.tables, flight.state, flight.scratch, flight.tables.dt
     wanted = scratch.si[QUANTITY.airspeed_command]
     slope = (scratch.known[KNOWN.airspeed_ahead] - wanted) / dt
+    known = scratch.known
+    if tables.plant.lateral != 0:
+        wanted += stand_still(state.reference, known[KNOWN.asked + 3], state.x, wanted + known[KNOWN.wind])
     value, value_rate, _ = critically_damped_ramp(
         tables.reference_frequency,
         wanted,
@@ -425,7 +429,6 @@ def move_reference(flight: Flight) -> None:
     state.reference[REFERENCE.airspeed] = value
     state.reference[REFERENCE.rate] = value_rate
     if tables.plant.lateral != 0:
-        known = scratch.known
         asked = known[KNOWN.asked], known[KNOWN.asked + 1], known[KNOWN.asked + 2], known[KNOWN.asked + 3]
         move_lateral_reference(state.reference, asked, state.x, known[KNOWN.wind_right], dt)
     state.clock[CLOCK.frame] += 1.0

@@ -34,10 +34,12 @@ failure was thrown in, part that the coming frame needs and that is not compiled
 none)."""
 REFERENCE = Places(
     "airspeed", "rate", "heading", "turn_rate", "turn_acceleration", "lateral", "lateral_rate", "on_track",
-    "line_north", "line_east", "line_course",
+    "line_north", "line_east", "line_course", "line_lateral", "line_lateral_rate", "standing",
 )  # fmt: skip
 """The filtered airspeed reference [m/s] and its rate [m/s^2]; heading [rad], turn rate [rad/s] and its rate; lateral
-velocity [m/s] and its rate; whether a line over the ground is held, one of its points [m] and its course [rad]."""
+velocity [m/s] and its rate; whether a line over the ground is held (2: the flight turns onto it), one of its points
+[m], its course [rad], its own motion to the right [m/s] and the rate of that; whether that point is held along the
+line, too."""
 END = Places(
     "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast",
     "aground", "bank",

@@ -241,7 +241,8 @@ class Flying:
             x = state.x
             turning = x[STATE.q] * math.sin(x[STATE.bank]) + x[STATE.r] * math.cos(x[STATE.bank])
             state.reference[[REFERENCE.heading, REFERENCE.turn_rate]] = x[STATE.heading], turning
-            state.reference[[REFERENCE.turn_acceleration, REFERENCE.lateral_rate, REFERENCE.on_track]] = 0.0
+            still = [REFERENCE.turn_acceleration, REFERENCE.lateral_rate, REFERENCE.on_track, REFERENCE.standing]
+            state.reference[still] = 0.0
             state.reference[REFERENCE.lateral] = x[STATE.v]
         self.do(frames_of.OBSERVE)
         present = np.array([state.u[INPUT.stick], state.u[INPUT.lever]])

@@ -17,7 +17,7 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.parts import call_at
 from rtsim.loop.data import CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Flight
-from rtsim.loop.lateral_reference_kernels import fill_wanted, turn_wanted
+from rtsim.loop.lateral_reference_kernels import ON_LINE, beside_line, fill_wanted, from_point, turn_wanted
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.pilot.lateral_kernels import WANTED
@@ -229,6 +229,13 @@ def _note_lateral(flight: Flight, sideways: float) -> None:
     towards_north, towards_east = wind_along(tables.wind, 0.0)
     si[QUANTITY.wind_north] = share * towards_north
     si[QUANTITY.wind_east] = share * towards_east
+    reference = state.reference
+    speed = max(reference[REFERENCE.airspeed], 0.0)
+    si[QUANTITY.bank_reference] = math.atan(speed * reference[REFERENCE.turn_rate] / GRAVITY)
+    si[QUANTITY.heading_reference] = _wrapped(reference[REFERENCE.heading])
+    si[QUANTITY.lateral_reference] = reference[REFERENCE.lateral]
+    si[QUANTITY.track_error] = beside_line(reference, x) if reference[REFERENCE.on_track] == ON_LINE else 0.0
+    si[QUANTITY.point_error] = from_point(reference, x) if reference[REFERENCE.standing] != 0.0 else 0.0
 
 
 @inner_kernel

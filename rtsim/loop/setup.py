@@ -30,6 +30,7 @@ from rtsim.aircraft.xv15.model import Xv15
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import gust_tables, new_gust_state, wind_tables
 from rtsim.atmosphere.specification import CALM, AirSpecification
+from rtsim.atmosphere.wind_kernels import WindTables, wind_share
 from rtsim.choices import CorridorName, PlantName, SwitchName
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
@@ -58,12 +59,14 @@ from rtsim.loop.data import (
     SimulationTables,
 )
 from rtsim.loop.flying import Flying, Measure, new_normals, new_streams
+from rtsim.loop.lateral_reference_kernels import line_by_heading
 from rtsim.loop.options import FULL_ROTOR_SPEED, FULL_TANKS, FlightOptions, declared
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
 from rtsim.lpv.aircraft import LpvAircraft
 from rtsim.lpv.database import Database
 from rtsim.lpv.flown import flown_database, meets_ground, moves_flaps, turns_rotors
+from rtsim.lpv.lateral import slip_trim
 from rtsim.lpv.lpv_kernels import work_size
 from rtsim.lpv.schedule_kernels import LpvTables
 from rtsim.lpv.sideways_kernels import sideways_work_size
@@ -157,31 +160,65 @@ def _start(setup: FlightSetup) -> tuple[float, float, float]:
     return start.airspeed, start.nacelle_angle, start.altitude
 
 
+def _start_lateral(programme: Programme, wind: WindTables, altitude: float) -> float:
+    """Airspeed to the right at the start: that asked for; on a track that is held by sideward flight, over the ground.
+
+    Args:
+        programme: What is asked for.
+        wind: The steady wind.
+        altitude: Altitude at the start [m].
+    """
+    first = min(1, programme.time.size - 1)  # a track is asked for on the way to a point
+    lateral = float(programme.lateral[0])
+    if programme.track[first] == 0.0:
+        return lateral
+    by_flying_sideward = 1.0 - interpreted(line_by_heading)(max(float(programme.airspeed[0]), 1.0))
+    return lateral - by_flying_sideward * interpreted(wind_share)(wind, altitude) * wind.right
+
+
 @functools.lru_cache(maxsize=16)
 def start_trim(
-    nonlinear: bool, database: Database, airspeed: float, nacelle: float, held: tuple[float, float] | None = None
+    nonlinear: bool,
+    database: Database,
+    airspeed: float,
+    nacelle: float,
+    held: tuple[float, float] | None = None,
+    lateral: float = 0.0,
 ) -> tuple[FloatArray, FloatArray]:
     """Trimmed state and inputs in level flight, altitude 0, read-only; kept, since batches start alike.
 
     Args:
         nonlinear: Trim the nonlinear aircraft; else the LPV aircraft.
         held: Rotor speed [rad/s], and its place on the database's nacelle axis [rad]; None: the conversion's.
+        lateral: Airspeed to the right [m/s].
 
     Raises:
         InputError: There is no trim.
     """
     if nonlinear:
         aircraft = Xv15.under(AircraftCondition.stored(database.attributes))
-        trim = aircraft.trim(Condition(airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held and held[0]))
+        condition = Condition(
+            airspeed=airspeed, nacelle_angle=nacelle, rotor_speed=held and held[0], lateral_airspeed=lateral
+        )
+        trim = aircraft.trim(condition)
         converged, x, u = trim.converged, trim.x.copy(), trim.u.copy()
     else:
         point = LpvAircraft(database).trim(airspeed=airspeed, nacelle=held[1] if held else nacelle)
         converged, x, u = point.converged, point.x.copy(), point.u.copy()
+        if lateral != 0.0:
+            dx, du, exists = slip_trim(
+                database, airspeed=airspeed, nacelle=held[1] if held else nacelle, lateral=lateral
+            )
+            converged = converged and exists
+            x, u = whole(x, ALL_STATES), whole(u, ALL_INPUTS)
+            x[: dx.size] += dx
+            u[: du.size] += du
     if not converged:
+        sideways = f", {to_kt(lateral):.1f} kn to the right" if lateral else ""
         raise InputError(
             "the aircraft has no level-flight trim there",
             key="start",
-            value=f"{to_kt(airspeed):.1f} kn at nacelle {to_deg(nacelle):.1f} deg",
+            value=f"{to_kt(airspeed):.1f} kn{sideways} at nacelle {to_deg(nacelle):.1f} deg",
             mend="start inside the conversion corridor (rtsim corridor shows it)",
         )
     x.setflags(write=False)
@@ -226,7 +263,23 @@ def build_parts(setup: FlightSetup) -> Parts:
         check_slow_rotors(drive)
     offset = held_offset(drive, options.rotor_speed, nacelle) if options.rotor_speed != FULL_ROTOR_SPEED else 0.0
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
-    trim = start_trim(nonlinear, database, airspeed, nacelle, held)
+    programme = setup.programme
+    lpv = None if nonlinear else _lpv_tables(database, options.plant)
+    rolls = nonlinear or hasattr(lpv, "symmetric")
+    if not (rolls or programme.symmetric):
+        raise InputError(
+            "this aircraft moves in its plane of symmetry alone, and the programme asks for turns or sideward flight",
+            key="plant", value=options.plant, mend="fly the plant lpv or nonlinear, or another programme",
+        )  # fmt: skip
+    wind = wind_tables(
+        options.wind,
+        None if options.wind_from < 0.0 else options.wind_from,
+        heading=options.heading,
+        reference_height=options.wind_reference_height,
+        felt=rolls,
+    )
+    lateral = _start_lateral(programme, wind, altitude)
+    trim = start_trim(nonlinear, database, airspeed, nacelle, held, lateral)
     x, u = (whole(part, variables) for part, variables in zip(trim, (ALL_STATES, ALL_INPUTS), strict=True))
     ground = load_ground_tables(profile, own) if options.ground else no_ground()
     if options.ground:
@@ -234,20 +287,11 @@ def build_parts(setup: FlightSetup) -> Parts:
             raise needed_inputs_error("ground", "on", "false", GROUND_INPUTS)
         altitude = max(altitude, light_on_wheels(ground, float(x[STATE.pitch])))
     x[STATE.altitude], x[STATE.heading] = altitude, options.heading
-    programme = setup.programme
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
     pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
-    lpv = None if nonlinear else _lpv_tables(database, options.plant)
-    rolls = nonlinear or hasattr(lpv, "symmetric")
     tables = SimulationTables(
         dt=dt,
-        wind=wind_tables(
-            options.wind,
-            None if options.wind_from < 0.0 else options.wind_from,
-            heading=options.heading,
-            reference_height=options.wind_reference_height,
-            felt=rolls,
-        ),
+        wind=wind,
         plant=PlantTables(
             aircraft=Address(own if nonlinear else lpv),
             configuration=own.configuration,

@@ -16,11 +16,14 @@ import numpy as np
 from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_OUTPUTS, LATERAL_STATES
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
+from rtsim.kernels.compiled import interpreted
+from rtsim.kernels.grid_kernels import cell
 from rtsim.lpv.cells import JACOBIAN_BITS, round_mantissa
 from rtsim.lpv.database import Database, StoredArrays
 
 REFERENCE_BITS = 36
 """Bits kept of the mantissa of the references (11 significant digits)."""
+_cell = interpreted(cell)
 _DERIVATIVES = ("loaded_A", "loaded_B", "loaded_C", "loaded_D", "A", "B", "C", "D")
 
 
@@ -114,6 +117,42 @@ class LateralData:
                     "the axis does not ascend", key=f"lateral/{name}", value=axis.tolist(), allowed=f"above {low:g}"
                 )
         return data
+
+
+def slip_trim(
+    database: Database, *, airspeed: float, nacelle: float, lateral: float
+) -> tuple[FloatArray, FloatArray, bool]:
+    """What sideward velocity changes in the level trim, between the trims in sideslip: linear on every axis.
+
+    Args:
+        database: A database with a lateral half.
+        airspeed: Airspeed ahead [m/s].
+        nacelle: Nacelle angle [rad].
+        lateral: Velocity along body y, right positive [m/s].
+
+    Returns:
+        Changes of the states and of the inputs, symmetric then lateral ones, and whether such trims exist there.
+    """
+    data, level = LateralData.of(database), database.level_layer
+    (i, s), (j, t) = _cell(database.airspeed, airspeed), _cell(database.nacelle, nacelle)
+    corners = (((0, 0), (1 - s) * (1 - t)), ((1, 0), s * (1 - t)), ((0, 1), (1 - s) * t), ((1, 1), s * t))
+    m, share = _cell(np.concatenate([[0.0], data.lateral_velocity]), abs(lateral))
+    exists = bool(abs(lateral) <= data.lateral_velocity[-1])
+    x, u = np.zeros(data.slip_x_ref.shape[-1]), np.zeros(data.slip_u_ref.shape[-1])
+    for (di, dj), weight in corners:
+        at = i + di, j + dj
+        for node, part in ((m - 1, (1.0 - share) * weight), (m, share * weight)):
+            if node < 0 or part == 0.0:  # the level trim, from which the changes are counted
+                continue
+            exists &= bool(data.slip_valid[node, *at])
+            x += part * data.slip_x_ref[node, *at]
+            u += part * data.slip_u_ref[node, *at]
+            x[: database.x_ref.shape[-1]] -= part * database.x_ref[level, *at]
+            u[: database.u_ref.shape[-1]] -= part * database.u_ref[level, *at]
+    if lateral < 0.0:  # its mirror image
+        x[database.x_ref.shape[-1] :] *= -1.0
+        u[database.u_ref.shape[-1] :] *= -1.0
+    return x, u, exists
 
 
 def _shapes(database: Database, data: LateralData) -> dict[str, tuple[int, ...]]:

@@ -20,7 +20,7 @@ from rtsim.places import Places
 from rtsim.protection import law_data as law
 from rtsim.protection.law_data import TorqueTables
 from rtsim.protection.limiter_kernels import torque_limit
-from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, STICK_HALF_TRAVEL_IN
+from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, PEDAL_HALF_TRAVEL_IN, STICK_HALF_TRAVEL_IN
 
 OUTSIDE_MARGIN_KT, PERSISTENCE_S, MERGE_S = -0.5, 0.1, 0.5
 """An exceedance: margin below this [kn], for this long [s]; events closer than the last are one [s]."""
@@ -158,6 +158,66 @@ METRICS = (
            lambda s: s.lever.largest - s.lever.least, (FLIGHT, SEARCH), flight="lever.travel", search="lever.travel"),
     Metric("lever_path", "", "distance moved by the lever", lambda s: s.lever.travelled, (SEARCH,),
            search="lever.path"),
+    Metric("bank_min_deg", "deg", "smallest bank angle, left negative", lambda s: s.bank_least, (FLIGHT,),
+           flight="bank_deg.min"),
+    Metric("bank_max_deg", "deg", "largest bank angle, right positive", lambda s: s.bank_largest, (FLIGHT,),
+           flight="bank_deg.max"),
+    Metric("bank_rms_error_deg", "deg",
+           "root mean square, over all frames, of bank minus that of the coordinated turn asked for, behind its filter",
+           lambda s: math.sqrt(s.bank_squares / s.frames), (FLIGHT,), flight="bank_deg.rms_error"),
+    Metric("bank_max_error_deg", "deg", "largest magnitude of that difference", lambda s: s.bank_error, (FLIGHT,),
+           flight="bank_deg.max_error"),
+    Metric("heading_final_deg", "deg", "heading of the last frame, 0 to 360", lambda s: s.heading, (FLIGHT,),
+           flight="heading_deg.final"),
+    Metric("heading_rms_error_deg", "deg",
+           "root mean square, over all frames, of heading minus the one asked for, behind its filter",
+           lambda s: math.sqrt(s.heading_squares / s.frames), (FLIGHT,), flight="heading_deg.rms_error"),
+    Metric("heading_max_error_deg", "deg", "largest magnitude of that difference", lambda s: s.heading_error,
+           (FLIGHT,), flight="heading_deg.max_error"),
+    Metric("sideslip_max_deg", "deg", "largest magnitude of the sideslip", lambda s: s.sideslip, (FLIGHT,),
+           flight="sideslip_deg.max"),
+    Metric("lateral_max_kt", "kn", "largest magnitude of the sideways airspeed", lambda s: s.lateral, (FLIGHT,),
+           flight="lateral_kt.max"),
+    Metric("point_max_error_m", "m", "largest distance from the point over the ground that is held; 0 without one",
+           lambda s: s.point_error, (FLIGHT,), flight="track_m.point_max_error"),
+    Metric("track_max_error_m", "m", "largest distance beside the line over the ground that is held; 0 without a line",
+           lambda s: s.track_error, (FLIGHT,), flight="track_m.max_error"),
+    Metric("position_north_m", "m", "place of the last frame north of the start", lambda s: s.north, (FLIGHT,),
+           flight="position_m.north"),
+    Metric("position_east_m", "m", "place of the last frame east of the start", lambda s: s.east, (FLIGHT,),
+           flight="position_m.east"),
+    Metric("position_north_min_m", "m", "least place north of the start", lambda s: s.north_least, (FLIGHT,),
+           flight="position_m.north_min"),
+    Metric("position_north_max_m", "m", "greatest place north of the start", lambda s: s.north_largest, (FLIGHT,),
+           flight="position_m.north_max"),
+    Metric("position_east_min_m", "m", "least place east of the start", lambda s: s.east_least, (FLIGHT,),
+           flight="position_m.east_min"),
+    Metric("position_east_max_m", "m", "greatest place east of the start", lambda s: s.east_largest, (FLIGHT,),
+           flight="position_m.east_max"),
+    Metric("position_max_distance_m", "m", "largest distance from the start, over the ground",
+           lambda s: math.sqrt(s.away), (FLIGHT,), flight="position_m.max_distance"),
+    Metric("lateral_stick_rms_in", "in", "standard deviation of the lateral stick that acted (±4.8 in)",
+           lambda s: _deviation(s.lateral_stick.sum, s.lateral_stick.squares, s.frames), (FLIGHT,),
+           flight="lateral_stick.rms_in"),
+    Metric("lateral_stick_rms_rate_in_s", "in/s", "standard deviation of the rate of the lateral stick",
+           lambda s: _deviation(s.lateral_stick.rate_sum, s.lateral_stick.rate_squares, s.lateral_stick.rates),
+           (FLIGHT,), flight="lateral_stick.rms_rate_in_s"),
+    Metric("lateral_stick_travel_in", "in", "largest minus smallest position of the lateral stick",
+           lambda s: s.lateral_stick.largest - s.lateral_stick.least, (FLIGHT,), flight="lateral_stick.travel_in"),
+    Metric("lateral_stick_peak_in", "in", "farthest position of the lateral stick from neutral",
+           lambda s: max(abs(s.lateral_stick.least), abs(s.lateral_stick.largest)), (FLIGHT,),
+           flight="lateral_stick.peak_in"),
+    Metric("pedal_rms_in", "in", "standard deviation of the pedals that acted (±2.5 in)",
+           lambda s: _deviation(s.pedal.sum, s.pedal.squares, s.frames), (FLIGHT,),
+           flight="pedal.rms_in"),
+    Metric("pedal_rms_rate_in_s", "in/s", "standard deviation of the rate of the pedals",
+           lambda s: _deviation(s.pedal.rate_sum, s.pedal.rate_squares, s.pedal.rates),
+           (FLIGHT,), flight="pedal.rms_rate_in_s"),
+    Metric("pedal_travel_in", "in", "largest minus smallest position of the pedals",
+           lambda s: s.pedal.largest - s.pedal.least, (FLIGHT,), flight="pedal.travel_in"),
+    Metric("pedal_peak_in", "in", "farthest position of the pedals from neutral",
+           lambda s: max(abs(s.pedal.least), abs(s.pedal.largest)), (FLIGHT,),
+           flight="pedal.peak_in"),
     Metric("controls_on_stop_frames", "", "frames with a stick, lever, pedals, cyclic or elevator on a stop",
            lambda s: s.stop_frames, (FLIGHT, SEARCH), kind=int),
     Metric("torque_ratio_peak", "", "largest mast torque as a share of its limit", lambda s: s.torque_share, (TRIAL,),
@@ -219,7 +279,10 @@ SUM = Places(
     "flapping", "flapping_squares", "flapping_peak", "flapping_peak_time", "flapping_late_peak", "flapping_over",
     "airspeed_squares", "airspeed_error", "airspeed", "nacelle", "nacelle_error", "nacelle_rate",
     "altitude", "height_lost", "height_gained", "pitch_least", "pitch_largest", "pitch_rate_squares",
-    ("stick", CONTROL.size), ("lever", CONTROL.size), "stop_frames",
+    ("stick", CONTROL.size), ("lever", CONTROL.size), ("lateral_stick", CONTROL.size), ("pedal", CONTROL.size),
+    "stop_frames", "bank_least", "bank_largest", "bank_squares", "bank_error", "heading", "heading_squares",
+    "heading_error", "sideslip", "lateral", "track_error", "point_error", "north", "north_least", "north_largest",
+    "east", "east_least", "east_largest", "away",
     "torque_share", "torque_over", "torque", "power", "power_largest", "fuel_flow", "load_largest", "load_least",
     "unacted", "activations", "corridor_active", "other_active", "nacelle_removed",
     "share_stick", "share_stick_squares", "share_stick_step", "share_lever", "share_lever_squares", "share_lever_step",
@@ -385,6 +448,38 @@ def _load_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> Non
 
 
 @inner_kernel
+def _lateral_step(sums: FloatArray, row: FloatArray, first: bool) -> None:
+    """The motion out of the plane of symmetry, and where the aircraft is."""
+    bank, heading = row[COLUMN.bank_deg], row[COLUMN.heading_deg]
+    if first:
+        sums[SUM.bank_least] = sums[SUM.bank_largest] = bank
+    sums[SUM.bank_least] = min(sums[SUM.bank_least], bank)
+    sums[SUM.bank_largest] = max(sums[SUM.bank_largest], bank)
+    error = bank - row[COLUMN.bank_reference_deg]
+    sums[SUM.bank_squares] += error * error
+    sums[SUM.bank_error] = max(sums[SUM.bank_error], abs(error))
+    error = heading - row[COLUMN.heading_reference_deg]
+    error -= 360.0 * math.floor(error / 360.0 + 0.5)
+    sums[SUM.heading_squares] += error * error
+    sums[SUM.heading_error] = max(sums[SUM.heading_error], abs(error))
+    sums[SUM.heading] = heading
+    sums[SUM.sideslip] = max(sums[SUM.sideslip], abs(row[COLUMN.sideslip_deg]))
+    sums[SUM.lateral] = max(sums[SUM.lateral], abs(row[COLUMN.lateral_kt]))
+    sums[SUM.track_error] = max(sums[SUM.track_error], abs(row[COLUMN.track_error_m]))
+    sums[SUM.point_error] = max(sums[SUM.point_error], row[COLUMN.point_error_m])
+    north, east = row[COLUMN.north_m], row[COLUMN.east_m]
+    if first:
+        sums[SUM.north_least] = sums[SUM.north_largest] = north
+        sums[SUM.east_least] = sums[SUM.east_largest] = east
+    sums[SUM.north], sums[SUM.east] = north, east
+    sums[SUM.north_least] = min(sums[SUM.north_least], north)
+    sums[SUM.north_largest] = max(sums[SUM.north_largest], north)
+    sums[SUM.east_least] = min(sums[SUM.east_least], east)
+    sums[SUM.east_largest] = max(sums[SUM.east_largest], east)
+    sums[SUM.away] = max(sums[SUM.away], north**2 + east**2)
+
+
+@inner_kernel
 def metrics_step(sums: FloatArray, row: FloatArray, programme: FloatArray, dt: float) -> None:
     """Add one frame.
 
@@ -408,6 +503,10 @@ def metrics_step(sums: FloatArray, row: FloatArray, programme: FloatArray, dt: f
     _load_step(sums, row, first, dt)
     _control_step(sums, SUM.stick, row[COLUMN.stick] * STICK_HALF_TRAVEL_IN, first, running, dt)
     _control_step(sums, SUM.lever, row[COLUMN.lever], first, running, dt)
+    lateral_stick, pedal = row[COLUMN.lateral_stick] * STICK_HALF_TRAVEL_IN, row[COLUMN.pedal] * PEDAL_HALF_TRAVEL_IN
+    _control_step(sums, SUM.lateral_stick, lateral_stick, first, running, dt)
+    _control_step(sums, SUM.pedal, pedal, first, running, dt)
+    _lateral_step(sums, row, first)
     if row[COLUMN.control_on_stop] > 0.5:
         sums[SUM.stop_frames] += 1.0
     height = row[COLUMN.altitude_m] - row[COLUMN.altitude_reference_m]

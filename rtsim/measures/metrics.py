@@ -195,7 +195,7 @@ def finished(sums: FloatArray, dt: float) -> FloatArray:
     if sums[SUM.frames] == 0.0:
         raise InputError("has no frames", key="flight")
     named = SimpleNamespace(**_named(sums, SUM), dt=dt)
-    for control in ("stick", "lever"):
+    for control in ("stick", "lever", "lateral_stick", "pedal"):
         setattr(named, control, SimpleNamespace(**_named(sums[getattr(SUM, control) :], CONTROL)))
     return np.array([metric.value(named) for metric in METRICS], dtype=np.float64)
 

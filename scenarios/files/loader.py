@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from rtsim.errors import InputError, suggestion
 from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
-from rtsim.programme import Programme, ProgrammePoint, Waypoint, timed_programme
+from rtsim.programme import TURN, Programme, ProgrammePoint, Waypoint, timed_programme
 from rtsim.strict import Examined
 from rtsim.toml_file import named_text, parse_toml, shipped_names
 from rtsim.units import deg, kt
@@ -17,7 +21,7 @@ from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
 from scenarios.files.expectation import Expectation, name_problems, range_problems
 from scenarios.files.nacelle_laws import automatic_problems, automatic_settings
 from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Scenario, ScenarioEvent
-from scenarios.files.schema import PointTable, ProgrammeTable, ScenarioFile, StartTable
+from scenarios.files.schema import TURN_KEYS, PointTable, ProgrammeTable, ScenarioFile, StartTable
 from scenarios.files.trial import pulses_of, trial_of, trial_problems
 
 LIBRARY = "scenarios/library"
@@ -173,6 +177,11 @@ def _point_contradictions(content: ScenarioFile, file: str) -> list[InputError]:
             if timed[0] and getattr(point, name) is not None:
                 key = f"programme.points[{number}].{name}"
                 found.append(InputError("has no meaning beside time_s", file=file, key=key, mend="delete one of them"))
+        asked = [name for name in TURN_KEYS if getattr(point, name) is not None]
+        if len(asked) > 1:
+            key, mend = f"programme.points[{number}].{asked[1]}", f"keep it or {asked[0]}"
+            problem = f"cannot be asked for beside {asked[0]}"
+            found.append(InputError(problem, file=file, key=key, value=getattr(point, asked[1]), mend=mend))
     return found
 
 
@@ -250,11 +259,13 @@ def _programme(table: ProgrammeTable, altitude: float) -> Programme:
     for point in table.points:
         altitude = altitude if point.altitude_m is None else point.altitude_m
         points.append((point, altitude))
+    sideways = _sideways(table.points)
     if points[0][0].time_s is not None:
         rows: list[tuple[Any, ...]] = [
-            (point.time_s, kt(point.airspeed_kt), deg(point.nacelle_deg), height) for point, height in points
+            (point.time_s, kt(point.airspeed_kt), deg(point.nacelle_deg), height, *turn, lateral, track)
+            for (point, height), (turn, lateral, track) in zip(points, sideways, strict=True)
         ]
-        return Programme(*([row[column] for row in rows] for column in range(4)))  # type: ignore[arg-type]
+        return Programme(*np.array(rows, dtype=np.float64).T)
     return timed_programme(
         [
             Waypoint(
@@ -265,8 +276,30 @@ def _programme(table: ProgrammeTable, altitude: float) -> Programme:
                 nacelle_rate=deg(point.nacelle_rate_deg_s or table.nacelle_rate_deg_s),
                 climb_rate=point.climb_rate_m_s or table.climb_rate_m_s,
                 hold=point.hold_s or 0.0,
+                turn=turn,
+                lateral=lateral,
+                track=track,
             )
-            for point, height in points
+            for (point, height), (turn, lateral, track) in zip(points, sideways, strict=True)
         ],
         nacelle_motion=table.nacelle_motion,
     )
+
+
+def _sideways(points: Sequence[PointTable]) -> list[tuple[tuple[int, float], float, bool]]:
+    """What turn, lateral speed and track each point asks for; what it does not say it takes from the one before."""
+    found, turn, lateral, track = [], (TURN.bank, 0.0), 0.0, False
+    for point in points:
+        if point.heading_deg is not None:
+            heading = deg(point.heading_deg)
+            if turn[0] == TURN.heading:  # the nearest way round
+                heading = turn[1] + math.remainder(heading - turn[1], 2.0 * math.pi)
+            turn = (TURN.heading, heading)
+        elif point.bank_deg is not None:
+            turn = (TURN.bank, deg(point.bank_deg))
+        elif point.turn_rate_deg_s is not None:
+            turn = (TURN.rate, deg(point.turn_rate_deg_s))
+        lateral = lateral if point.lateral_kt is None else kt(point.lateral_kt)
+        track = track if point.track is None else point.track
+        found.append((turn, lateral, track))
+    return found

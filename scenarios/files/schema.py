@@ -16,7 +16,9 @@ from rtsim.choices import PilotMode
 from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
+from rtsim.programme import LARGEST_BANK, LARGEST_LATERAL, LARGEST_TURN_RATE
 from rtsim.strict import Strict
+from rtsim.units import to_deg, to_kt
 from scenarios.files.nacelle_laws import AutomaticTable
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
@@ -32,6 +34,19 @@ DurationS = Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
 AccelerationKtS = Annotated[float, Field(ge=0.1, le=10.0, allow_inf_nan=False)]
 NacelleRateDegS = Annotated[float, Field(ge=0.1, le=12.0, allow_inf_nan=False)]
 ClimbRateMS = Annotated[float, Field(ge=0.1, le=15.0, allow_inf_nan=False)]
+HeadingDeg = Annotated[float, Field(ge=0.0, le=360.0, allow_inf_nan=False)]
+
+
+def _within(largest: float) -> Any:
+    """A number of either sign."""
+    return Annotated[float, Field(ge=-largest, le=largest, allow_inf_nan=False)]
+
+
+BankDeg: Any = _within(round(to_deg(LARGEST_BANK), 6))
+TurnRateDegS: Any = _within(round(to_deg(LARGEST_TURN_RATE), 6))
+LateralKt: Any = _within(round(to_kt(LARGEST_LATERAL), 6))
+TURN_KEYS = ("heading_deg", "bank_deg", "turn_rate_deg_s")
+"""What a point may ask of the heading: one of them."""
 
 
 FlightTable: Any = create_model(
@@ -62,6 +77,11 @@ class PointTable(Strict):
     nacelle_rate_deg_s: NacelleRateDegS | None = None
     climb_rate_m_s: ClimbRateMS | None = None
     hold_s: DurationS | None = None
+    heading_deg: HeadingDeg | None = None
+    bank_deg: BankDeg | None = None
+    turn_rate_deg_s: TurnRateDegS | None = None
+    lateral_kt: LateralKt | None = None
+    track: bool | None = None
 
 
 class ProgrammeTable(Strict):

@@ -111,7 +111,8 @@ def test_flapping_and_margins_are_the_magnitudes_they_say(rows: np.ndarray) -> N
 LATERAL_COLUMNS = (
     "bank_deg", "roll_rate_deg_s", "yaw_rate_deg_s", "turn_rate_deg_s", "sideslip_deg", "lateral_kt",
     "lateral_acceleration", "aileron_deg", "rudder_deg", "differential_collective_deg", "differential_cyclic_deg",
-    "gust_v_m_s", "gust_p_deg_s", "gust_r_deg_s",
+    "gust_v_m_s", "gust_p_deg_s", "gust_r_deg_s", "bank_reference_deg", "lateral_reference_kt", "track_error_m",
+    "point_error_m",
 )  # fmt: skip
 
 
@@ -138,6 +139,7 @@ def test_the_same_flight_on_another_heading() -> None:
     assert column(turned, "north_m") == pytest.approx(distance * np.cos(heading), abs=ROUNDING)
     assert column(turned, "east_m") == pytest.approx(distance * np.sin(heading), abs=ROUNDING)
     assert column(turned, "heading_deg") == pytest.approx(210.0)
+    assert column(turned, "heading_reference_deg") == pytest.approx(210.0)
     assert column(turned, "track_deg") == pytest.approx(210.0)
     assert column(turned, "wind_east_m_s") == pytest.approx(WIND * np.sin(heading))
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rtsim.cli.check import file_problems
 from rtsim.errors import InputError
+from rtsim.programme import TURN, Programme
 from rtsim.units import kt, to_deg, to_kt
 from scenarios.files.expectation import Expectation
 from scenarios.files.loader import library_names, load_scenario, parse_scenario, scenario_problems
@@ -84,6 +86,21 @@ def test_a_good_file_arrives_in_si() -> None:
         ("nacelle_deg = 80", "nacelle = 80", ["programme.points[1]", "nacelle_deg"]),
         ("nacelle_deg = 80", "nacelle_deg = 80, time_s = 9", ["programme.points[0].time_s: is missing", "or none"]),
         ("nacelle_rate_deg_s = 2.5", "nacelle_rate_deg_s = 13", ["nacelle_rate_deg_s", "got 13", "0.1 to 12"]),
+        ("nacelle_deg = 80", "nacelle_deg = 80, heading_deg = 361", ["points[1].heading_deg", "got 361", "0 to 360"]),
+        ("nacelle_deg = 80", "nacelle_deg = 80, bank_deg = -61", ["points[1].bank_deg", "got -61", "-60 to 60"]),
+        ("nacelle_deg = 80", "nacelle_deg = 80, turn_rate_deg_s = 31", ["turn_rate_deg_s", "got 31", "-30 to 30"]),
+        ("nacelle_deg = 80", "nacelle_deg = 80, lateral_kt = 36", ["points[1].lateral_kt", "got 36", "-35 to 35"]),
+        ("nacelle_deg = 80", "nacelle_deg = 80, track = 1", ["points[1].track: must be true or false"]),
+        (
+            "nacelle_deg = 80",
+            "nacelle_deg = 80, bank_deg = 5, heading_deg = 30",
+            ["points[1].bank_deg: cannot be asked for beside heading_deg", "got 5", "keep it or heading_deg"],
+        ),
+        (
+            "nacelle_deg = 80",
+            "nacelle_deg = 80, bank_deg = 5, turn_rate_deg_s = 3",
+            ["points[1].turn_rate_deg_s: cannot be asked for beside bank_deg", "got 3", "keep it or bank_deg"],
+        ),
         ("[programme]", "[programme", ["is not valid TOML", "line 11", "correct this line"]),
         ("[programme]", "[programme]\npoints = []", ["is not valid TOML", "line"]),
         ('pilot = "hold"', 'pilot = "sleep"', ["events[0].pilot", "'sleep'", "mocm, external, hold"]),
@@ -140,6 +157,40 @@ def test_programmes_that_cannot_be_flown(points: str, words: str) -> None:
     _, problems = parse_scenario(text, file="x.toml")
     assert words in str(problems[0])
     assert str(problems[0]).startswith("x.toml: ")
+
+
+def _points(*points: str, timed: bool = True) -> Programme:
+    rows = [
+        f"{{ airspeed_kt = 40, nacelle_deg = 90{f', time_s = {10 * k}' if timed else ', hold_s = 5'}{more} }}"
+        for k, more in enumerate(points)
+    ]
+    text = f'format = 1\nname = "x"\ntitle = "x"\nduration_s = 99\n[programme]\npoints = [{", ".join(rows)}]\n'
+    scenario, problems = parse_scenario(text, file="x.toml")
+    assert scenario is not None, problems
+    return scenario.programme
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_a_point_takes_from_the_one_before_what_it_does_not_say(timed: bool) -> None:
+    asked = _points(
+        "", ", bank_deg = 20, lateral_kt = -5, track = true", "", ", turn_rate_deg_s = -3, track = false",
+        ", heading_deg = 90, lateral_kt = 0", "", timed=timed,
+    )  # fmt: skip
+    ends = [list(asked.time).index(10.0 * k if timed else 5.0 * (k + 1)) for k in range(6)]
+    assert asked.turn_kind[ends].tolist() == [TURN.bank] * 3 + [TURN.rate] + [TURN.heading] * 2
+    assert np.rad2deg(asked.turn[ends]) == pytest.approx([0.0, 20.0, 20.0, -3.0, 90.0, 90.0])
+    assert asked.lateral[ends] / kt(1.0) == pytest.approx([0.0, -5.0, -5.0, -5.0, 0.0, 0.0])
+    assert asked.track[ends].tolist() == [0.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+
+
+def test_headings_go_the_nearest_way_round() -> None:
+    asked = _points(*(f", heading_deg = {angle}" for angle in (350, 10, 120, 240, 360, 300)))
+    assert np.rad2deg(asked.turn) == pytest.approx([350.0, 370.0, 480.0, 600.0, 720.0, 660.0])
+
+
+def test_a_straight_programme_stays_symmetric() -> None:
+    assert _points("", "").symmetric
+    assert not _points("", ", track = true").symmetric
 
 
 def test_a_hold_needs_a_start_and_a_duration() -> None:

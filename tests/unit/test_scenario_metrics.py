@@ -44,6 +44,14 @@ KEYS = {
     "stick": ("rms_in", "rms_rate_in_s", "travel_in"),
     "lever": ("rms", "rms_rate_per_s", "travel"),
     "fuel_lb": ("used",),
+    "bank_deg": ("min", "max", "rms_error", "max_error"),
+    "heading_deg": ("final", "rms_error", "max_error"),
+    "sideslip_deg": ("max",),
+    "lateral_kt": ("max",),
+    "track_m": ("max_error", "point_max_error"),
+    "position_m": ("north", "east", "north_min", "north_max", "east_min", "east_max", "max_distance"),
+    "lateral_stick": ("rms_in", "rms_rate_in_s", "travel_in", "peak_in"),
+    "pedal": ("rms_in", "rms_rate_in_s", "travel_in", "peak_in"),
 }
 
 
@@ -95,6 +103,50 @@ def test_pitch_nacelle_rate_and_stops() -> None:
     assert (metrics.pitch_deg.min, metrics.pitch_deg.max) == (-7.0, 3.0)
     assert metrics.nacelle_deg.max_rate_deg_s == 7.5
     assert metrics.controls_on_stop_frames == 2
+
+
+def test_bank_and_heading_are_held_against_what_is_asked_for() -> None:
+    rows = history(
+        4,
+        bank_deg=np.array([1.0, -4.0, 6.0, 5.0]),
+        bank_reference_deg=np.array([1.0, -2.0, 2.0, 5.0]),
+        heading_deg=np.array([359.0, 2.0, 1.0, 358.0]),
+        heading_reference_deg=np.array([1.0, 1.0, 359.0, 358.0]),
+    )
+    metrics = flight_metrics(rows, HOLD, DT)
+    bank, heading = metrics.bank_deg, metrics.heading_deg
+    assert (bank.min, bank.max, bank.max_error) == (-4.0, 6.0, 4.0)
+    assert bank.rms_error == pytest.approx(math.sqrt((4.0 + 16.0) / 4.0))
+    assert (heading.final, heading.max_error) == (358.0, 2.0)
+    assert heading.rms_error == pytest.approx(math.sqrt((4.0 + 1.0 + 4.0) / 4.0))
+
+
+def test_places_and_distances_over_the_ground() -> None:
+    rows = history(
+        3,
+        north_m=np.array([0.0, -3.0, 1.0]),
+        east_m=np.array([0.0, 4.0, -2.0]),
+        track_error_m=np.array([0.0, -2.5, 1.0]),
+        point_error_m=np.array([0.0, 0.7, 0.2]),
+        sideslip_deg=np.array([1.0, -9.0, 2.0]),
+        lateral_kt=np.array([-3.0, 2.0, 1.0]),
+    )
+    metrics = flight_metrics(rows, HOLD, DT)
+    place = metrics.position_m
+    assert (place.north, place.east, place.max_distance) == (1.0, -2.0, 5.0)
+    assert (place.north_min, place.north_max, place.east_min, place.east_max) == (-3.0, 1.0, -2.0, 4.0)
+    assert (metrics.track_m.max_error, metrics.track_m.point_max_error) == (2.5, 0.7)
+    assert (metrics.sideslip_deg.max, metrics.lateral_kt.max) == (9.0, 3.0)
+
+
+def test_lateral_stick_and_pedals_in_inches_of_their_travel() -> None:
+    rows = history(4, lateral_stick=np.array([0.0, -0.5, 0.25, 0.25]), pedal=np.array([0.2, 0.2, -1.0, 0.2]))
+    metrics = flight_metrics(rows, HOLD, DT)
+    stick, pedal = metrics.lateral_stick, metrics.pedal
+    assert (stick.peak_in, stick.travel_in) == pytest.approx((2.4, 3.6))
+    assert (pedal.peak_in, pedal.travel_in) == pytest.approx((2.5, 3.0))
+    assert stick.rms_in == pytest.approx(4.8 * np.std([0.0, -0.5, 0.25, 0.25]))
+    assert pedal.rms_rate_in_s == pytest.approx(2.5 * np.std([0.0, -1.2, 1.2]) / DT)
 
 
 def test_flapping_of_a_decaying_peak() -> None:
@@ -243,6 +295,18 @@ def flown() -> tuple[FloatArray, Programme]:
         protection_stick=wandering(0.0, 0.3),
         protection_lever=wandering(0.0, 0.2),
         protection_nacelle_rate_deg_s=wandering(0.0, 4.0),
+        lateral_stick=wandering(0.1, 0.6),
+        pedal=wandering(-0.1, 0.6),
+        bank_deg=wandering(3.0, 40.0),
+        bank_reference_deg=wandering(0.0, 40.0),
+        heading_deg=wandering(180.0, 170.0),
+        heading_reference_deg=wandering(180.0, 170.0),
+        sideslip_deg=wandering(0.0, 9.0),
+        lateral_kt=wandering(0.0, 9.0),
+        north_m=wandering(5.0, 90.0),
+        east_m=wandering(-5.0, 90.0),
+        track_error_m=wandering(0.0, 9.0),
+        point_error_m=np.abs(wandering(0.0, 9.0)),
     )
     return rows, programme
 
@@ -256,12 +320,21 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
     time, margin, flapping, pitch = of("time_s"), of("margin_kt"), of("flapping_deg"), of("pitch_deg")
     error, height = of("airspeed_kt") - of("airspeed_reference_kt"), of("altitude_m") - of("altitude_reference_m")
     controls = {}
-    for name, scale, ends in (("stick", 4.8, ("_in", "_in_s")), ("lever", 1.0, ("", "_per_s"))):
+    inches = ("_in", "_in_s")
+    for name, scale, ends in (
+        ("stick", 4.8, inches), ("lever", 1.0, ("", "_per_s")), ("lateral_stick", 4.8, inches), ("pedal", 2.5, inches),
+    ):  # fmt: skip
         values = of(name) * scale
         controls[f"{name}_rms{ends[0]}"] = values.std()
         controls[f"{name}_rms_rate{ends[1]}"] = (np.diff(values) / DT).std()
         controls[f"{name}_travel{ends[0]}"] = np.ptp(values)
-        controls[f"{name}_path{ends[0]}"] = np.abs(np.diff(values)).sum()
+        if name in {"stick", "lever"}:
+            controls[f"{name}_path{ends[0]}"] = np.abs(np.diff(values)).sum()
+        else:
+            controls[f"{name}_peak_in"] = np.abs(values).max()
+    north, east, bank = of("north_m"), of("east_m"), of("bank_deg")
+    banked, turned_by = bank - of("bank_reference_deg"), of("heading_deg") - of("heading_reference_deg")
+    astray = np.abs((turned_by + 180.0) % 360.0 - 180.0)
     takeoff = (of("nacelle_deg") > 80.0) & (of("airspeed_kt") < 60.0)
     torque = of("mast_torque_inlb") / np.where(takeoff, 163e3, 130e3)
     reasons = np.stack([of(f"protection_{name}_reason") for name in ("stick", "lever", "nacelle")])
@@ -301,6 +374,24 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
         "pitch_beyond_deg": np.abs(pitch).max() - 25.0,
         "pitch_excursion_deg": np.ptp(pitch),
         "pitch_rate_rms_deg_s": np.sqrt(np.mean(of("pitch_rate_deg_s") ** 2)),
+        "bank_min_deg": bank.min(),
+        "bank_max_deg": bank.max(),
+        "bank_rms_error_deg": np.sqrt(np.mean(banked**2)),
+        "bank_max_error_deg": np.abs(banked).max(),
+        "heading_final_deg": of("heading_deg")[-1],
+        "heading_rms_error_deg": np.sqrt(np.mean(astray**2)),
+        "heading_max_error_deg": astray.max(),
+        "sideslip_max_deg": np.abs(of("sideslip_deg")).max(),
+        "lateral_max_kt": np.abs(of("lateral_kt")).max(),
+        "point_max_error_m": of("point_error_m").max(),
+        "track_max_error_m": np.abs(of("track_error_m")).max(),
+        "position_north_m": north[-1],
+        "position_east_m": east[-1],
+        "position_north_min_m": north.min(),
+        "position_north_max_m": north.max(),
+        "position_east_min_m": east.min(),
+        "position_east_max_m": east.max(),
+        "position_max_distance_m": np.hypot(north, east).max(),
         "controls_on_stop_frames": of("control_on_stop").sum(),
         "torque_ratio_peak": torque.max(),
         "torque_over_s": (torque > 1.02).sum() * DT,
