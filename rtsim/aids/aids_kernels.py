@@ -126,7 +126,12 @@ def scheduled(tables: Any, which: int, airspeed: float, nacelle: float) -> float
 
 @inner_kernel
 def beyond(value: float, dead_zone: float) -> float:
-    """The part of a deflection beyond the dead zone, rescaled to full travel."""
+    """The part of a deflection beyond the dead zone, rescaled to full travel.
+
+    Args:
+        value: Deflection.
+        dead_zone: Where it begins to count.
+    """
     if abs(value) <= dead_zone:
         return 0.0
     return math.copysign((abs(value) - dead_zone) / (1.0 - dead_zone), value)
@@ -134,7 +139,12 @@ def beyond(value: float, dead_zone: float) -> float:
 
 @inner_kernel
 def limited(value: float, limit: float) -> float:
-    """A value no larger than a limit, either way."""
+    """A value no larger than a limit, either way.
+
+    Args:
+        value: Anything.
+        limit: The limit of its magnitude.
+    """
     return min(max(value, -limit), limit)
 
 

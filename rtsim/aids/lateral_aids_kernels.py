@@ -85,15 +85,13 @@ class LateralAidTables(NamedTuple):
     pedals: tuple[float, float]
     """Airspeeds between which heading hold passes from pedals to bank [m/s]."""
     place_speed: float
-    """Ground speed up to which a place is held [m/s]."""
+    """Ground speed up to which a place is taken, and largest one asked for towards it [m/s]."""
     place_rate: float
     """Speed asked for per distance from the place [1/s]."""
     place_damping: float
     """Acceleration asked for per speed error [1/s]."""
     place_time: float
     """Time constant of the integral [s]."""
-    place_approach: float
-    """Largest speed asked for towards the place [m/s]."""
     place_attitude: float
     """Largest bank, and pitch from its trim, that the place asks for [rad]."""
     authority: float
@@ -168,12 +166,14 @@ def _hold_place(
         state[MEMORY.east_reference] = east + v_east / rate
     state[MEMORY.place_share] = min(share + dt / tables.fade_time, 1.0)
     off_north, off_east = state[MEMORY.north_reference] - north, state[MEMORY.east_reference] - east
-    approach, gain = tables.place_approach, dt * rate * damping / tables.place_time
-    a_north = damping * (limited(rate * off_north, approach) - v_north) + state[MEMORY.north_integral]
-    a_east = damping * (limited(rate * off_east, approach) - v_east) + state[MEMORY.east_integral]
-    largest = tables.place_attitude * GRAVITY
-    state[MEMORY.north_integral] = limited(state[MEMORY.north_integral] + gain * limited(off_north, approach), largest)
-    state[MEMORY.east_integral] = limited(state[MEMORY.east_integral] + gain * limited(off_east, approach), largest)
+    error_north = limited(rate * off_north, tables.place_speed) - v_north
+    error_east = limited(rate * off_east, tables.place_speed) - v_east
+    largest, learning = tables.place_attitude * GRAVITY, dt * damping / tables.place_time
+    a_north = damping * error_north + state[MEMORY.north_integral]
+    a_east = damping * error_east + state[MEMORY.east_integral]
+    # Of the speed error, not of the distance: it does not wind up while the aircraft comes to rest.
+    state[MEMORY.north_integral] = limited(state[MEMORY.north_integral] + learning * error_north, largest)
+    state[MEMORY.east_integral] = limited(state[MEMORY.east_integral] + learning * error_east, largest)
     sh, ch = math.sin(x[STATE.heading]), math.cos(x[STATE.heading])
     ahead, right = a_north * ch + a_east * sh, a_east * ch - a_north * sh
     trim = scheduled(tables, LATERAL_MAP.pitch, airspeed, nacelle)

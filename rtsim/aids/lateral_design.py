@@ -79,7 +79,6 @@ def _tables(database: Database, maps: FloatArray, aids: Part) -> LateralAidTable
         place_rate=part.number("place_rate_per_s", low=0.01, high=10.0),
         place_damping=part.number("place_damping_per_s", low=0.01, high=10.0),
         place_time=part.number("place_time_s", low=0.1, high=1000.0),
-        place_approach=part.number("place_approach_m_s", low=0.01, high=50.0),
         place_attitude=deg(part.number("place_attitude_deg", low=0.1, high=45.0)),
         authority=aids.number("authority", low=0.0, high=1.0),
         dead_zone=aids.number("dead_zone", low=0.0, high=0.5),
