@@ -1,8 +1,8 @@
 """Handling numbers of the aircraft in the pilot's hands: roots, bandwidth and phase delay, with any set of aids.
 
-The loop is the one that flies (``handling_loop``). Bandwidth and phase delay follow ADS-33E-PRF 3.3.2.1: the bandwidth
-is the lower of the frequency at which the attitude lags the control by 135 deg and the frequency at which 6 dB are left
-to the gain at 180 deg; the phase delay is how fast the phase falls beyond.
+The loop is the one that flies, linearized (``handling_loop``). Bandwidth and phase delay follow ADS-33E-PRF 3.3.2.1:
+the bandwidth is the lower of the frequency at which the attitude lags the control by 135 deg and the frequency at which
+6 dB are left to the gain at 180 deg; the phase delay is how fast the phase falls beyond.
 """
 
 from __future__ import annotations

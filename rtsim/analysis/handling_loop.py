@@ -1,29 +1,41 @@
 """The aircraft in the pilot's hands as a linear sampled system: what flies, frame by frame, linearized numerically.
 
-The LPV aircraft's Runge-Kutta step, the aids' kernels and where the aircraft is over the ground. About a symmetric trim
-the motion in the plane of symmetry and that out of it do not meet.
+The LPV aircraft's Runge-Kutta step, out of the plane of symmetry its linear model, the aids' kernels and where the
+aircraft is over the ground. About a symmetric trim the motion in the plane of symmetry and that out of it do not meet.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from rtsim.aids.aids_kernels import AID_COUNT, MEMORY, aids_engage, aids_step
 from rtsim.aids.design import design_aids, switches_of
 from rtsim.aids.lateral_aids_kernels import QUIET_TIME, lateral_aids_step
-from rtsim.aids.lateral_design import LATERAL_AIDS, design_lateral_aids
-from rtsim.aircraft.variables import ALL_INPUTS, ALL_STATES, INPUT, LATERAL_STATES, STATE, STATES, whole
+from rtsim.aids.lateral_design import design_lateral_aids
+from rtsim.aircraft.variables import (
+    ALL_INPUTS,
+    ALL_STATES,
+    INPUT,
+    INPUTS,
+    LATERAL_INPUTS,
+    LATERAL_STATES,
+    STATE,
+    STATES,
+    whole,
+)  # fmt: skip
 from rtsim.arrays import FloatArray
 from rtsim.choices import AidName
 from rtsim.command import CHANNELS
+from rtsim.kernels.grid_kernels import cell
 from rtsim.lpv.aircraft import LpvAircraft
+from rtsim.lpv.lateral import LateralData
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
-from rtsim.lpv.sideways_kernels import sideways_step, sideways_work_size
-from rtsim.lpv.sideways_tables import prepare_sideways
 from rtsim.lpv.tables import prepare_tables
 
 DT = 0.004
@@ -33,6 +45,9 @@ _PULSE = 0.2
 """Movement of a control beyond the aids' dead zone."""
 _PLACE = ("north", "north_integral", "last_north"), ("east", "east_integral", "last_east")
 _SYMMETRIC = tuple(MEMORY.asdict())[: MEMORY.lateral_offset]
+_LATERAL = slice(len(STATES), len(STATES) + len(LATERAL_STATES))
+_LATERAL_INPUTS = slice(len(INPUTS), len(INPUTS) + len(LATERAL_INPUTS))
+_Step = Callable[[FloatArray, FloatArray], None]
 _REFERENCES = ("bank_reference", "heading_reference")
 
 
@@ -108,12 +123,10 @@ def _linearized(
     held: bool,
 ) -> LinearLoop:
     """Central differences of one frame with the named states and memories, and pulses of the controls."""
-    trim = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
-    database, switches = aircraft.database, switches_of(aids)
-    symmetric, tables, lateral_tables = prepare_tables(database), design_aids(database), design_lateral_aids(database)
-    sideways = prepare_sideways(database) if database.lateral is not None else None
-    work = np.zeros(work_size(symmetric) if sideways is None else sideways_work_size(sideways))
-    path = np.tile([nacelle, 0.0, 0.0], (3, 1))
+    trim, switches = aircraft.trim(airspeed=airspeed, nacelle=nacelle), switches_of(aids)
+    tables, lateral_tables = design_aids(aircraft.database), design_lateral_aids(aircraft.database)
+    lateral = controls[0] != "stick"
+    move = _lateral_step(aircraft, airspeed, nacelle) if lateral else _symmetric_step(aircraft, nacelle)
     x0, u0 = whole(trim.x, ALL_STATES), whole(trim.u, ALL_INPUTS)
     acting0 = np.array([u0[INPUT.stick], u0[INPUT.lever], 0.0, 0.0, 0.0])
     hands0 = acting0.copy()
@@ -123,24 +136,21 @@ def _linearized(
     aids_engage(tables, state0, switches, x0, nacelle, hands0, np.zeros(3), acting0)
     if held:
         state0[[MEMORY.heading_held, MEMORY.place_share, MEMORY.quiet_time]] = 1.0, 1.0, 2.0 * QUIET_TIME
+    on_place = "position_hold" in aids
     places = [STATE.asdict().get(name, len(ALL_STATES) + MEMORY.asdict().get(name, 0)) for name in names]
-    lateral = bool(LATERAL_AIDS.intersection(aids)) or controls[0] != "stick"
 
     def frame(z: FloatArray, control: str = "stick", moved: float = 0.0) -> FloatArray:
         x, state, acting, u = z[: x0.size].copy(), z[x0.size :].copy(), acting0.copy(), u0.copy()
         hands = hands0.copy()
         hands[CHANNELS.index(control)] += moved
         state[MEMORY.last_switches :] = switches[:AID_COUNT]
-        if lateral:
+        if lateral or on_place:
             at = float(state[MEMORY.schedule_airspeed])
             lateral_aids_step(lateral_tables, state, switches, x, nacelle, at, hands, acting, DT)
         aids_step(tables, state, switches, x, nacelle, hands, np.zeros(3), acting, DT)
         u[[INPUT.stick, INPUT.lever, INPUT.lateral_stick, INPUT.pedal]] = acting[[0, 1, 3, 4]]
         before = _over_ground(x)
-        if sideways is None:
-            lpv_step(symmetric, x, u, path, DT, work)
-        else:
-            sideways_step(sideways, x, u, path, DT, work)
+        move(x, u)
         x[[STATE.north, STATE.east]] += 0.5 * DT * (before + _over_ground(x))
         return np.concatenate([x, state])[places]
 
@@ -149,6 +159,29 @@ def _linearized(
     # Pulses beyond the dead zone, so that commanded rates are seen too.
     b = {c: (frame(z0, c, _PULSE) - frame(z0, c, -_PULSE)) / (2.0 * _PULSE) for c in controls}
     return LinearLoop(a, b, names)
+
+
+def _symmetric_step(aircraft: LpvAircraft, nacelle: float) -> _Step:
+    """The step that flies in the plane of symmetry."""
+    tables, path = prepare_tables(aircraft.database), np.tile([nacelle, 0.0, 0.0], (3, 1))
+    work = np.zeros(work_size(tables))
+    return lambda x, u: lpv_step(tables, x, u, path, DT, work)
+
+
+def _lateral_step(aircraft: LpvAircraft, airspeed: float, nacelle: float) -> _Step:
+    """One frame of the linear model out of it; the flying step takes chords over 2.5 kn of sideward speed."""
+    database = aircraft.database
+    data = LateralData.of(database)
+    (i, s), (j, t) = cell(database.airspeed, airspeed), cell(database.nacelle, nacelle)
+    share = np.array([[(1.0 - s) * (1.0 - t), (1.0 - s) * t], [s * (1.0 - t), s * t]])
+    a, b = (np.tensordot(share, array[0, i : i + 2, j : j + 2]) for array in (data.A, data.B))
+    n, m = b.shape
+    over_frame = scipy.linalg.expm(DT * np.block([[a, b], [np.zeros((m, n + m))]]))[:n]
+
+    def step(x: FloatArray, u: FloatArray) -> None:
+        x[_LATERAL] = over_frame @ np.concatenate([x[_LATERAL], u[_LATERAL_INPUTS]])
+
+    return step
 
 
 def _over_ground(x: FloatArray) -> FloatArray:
