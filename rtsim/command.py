@@ -145,6 +145,33 @@ class Sensors:
     """The nacelles rest on the airplane-mode stop."""
     nacelle_ok: bool
     """The conversion actuator follows its commands."""
+    bank: float = 0.0
+    """Bank angle, right positive [rad]."""
+    roll_rate: float = 0.0
+    """Body roll rate, right positive [rad/s]."""
+    yaw_rate: float = 0.0
+    """Body yaw rate, nose right positive [rad/s]."""
+    heading: float = 0.0
+    """Heading, clockwise from north, 0 to 2 pi [rad]."""
+    sideslip: float = 0.0
+    """Sideslip with gusts, wind from the right positive: atan2(v, sqrt(u^2 + w^2 + V0^2)), V0 as for scheduling,
+    4.5 m/s: defined in hover too [rad]."""
+    lateral_velocity: float = 0.0
+    """Sideways airspeed in the horizontal plane, right positive [m/s]."""
+    lateral_acceleration: float = 0.0
+    """Specific force along body y over g, right positive [-]."""
+    north: float = 0.0
+    """Place north of the start [m]."""
+    east: float = 0.0
+    """Place east of the start [m]."""
+    flapping_left: float = 0.0
+    """Magnitude of the left rotor's flapping relative to its mast [rad]."""
+    flapping_right: float = 0.0
+    """The same of the right rotor [rad]."""
+    mast_torque_left: float = 0.0
+    """Torque of the left mast [N m]."""
+    mast_torque_right: float = 0.0
+    """Torque of the right mast [N m]."""
 
 
 SENSOR = Places(*Sensors.__slots__)
@@ -165,6 +192,16 @@ class Reference:
     """Rate of the programme's nacelle angle over the coming frame [rad/s]."""
     altitude: float
     """Altitude to hold [m]."""
+    heading: float = 0.0
+    """Heading to hold, clockwise from north [rad]."""
+    bank: float = 0.0
+    """Bank angle, right positive [rad]."""
+    lateral_velocity: float = 0.0
+    """Sideways airspeed, right positive [m/s]."""
+    north: float = 0.0
+    """Place north of the start [m]."""
+    east: float = 0.0
+    """Place east of the start [m]."""
 
 
 @dataclass(frozen=True, slots=True)

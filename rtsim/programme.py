@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
+from rtsim.places import Places
 from rtsim.units import deg, kt, to_deg, to_kt
 
 AIRSPEED_RANGE = (kt(-40.0), kt(260.0))
@@ -28,10 +29,23 @@ START_ALTITUDE_RANGE = (0.0, 10_000.0)
 """Altitudes at which a flight may start [m]."""
 MAX_NACELLE_RATE = deg(12.0)
 """Fastest nacelle motion that may be assigned [rad/s]; the pilot's switch is slower."""
+LARGEST_BANK = deg(60.0)
+"""Largest bank a programme may ask for [rad]."""
+LARGEST_TURN_RATE = deg(30.0)
+"""Fastest turn a programme may ask for [rad/s]."""
+LARGEST_LATERAL = kt(35.0)
+"""Fastest sideward flight a programme may ask for [m/s]."""
 _ROUNDING = 1e-9
+
+TURN = Places("bank", "rate", "heading")
+"""What a point asks for: a bank angle (0: straight on), a turn rate, or a heading."""
 
 NacelleMotion = Literal["spread", "rate"]
 """``spread``: linear over the whole segment; ``rate``: at the nacelle rate first, then held."""
+
+
+LATERAL_ROWS = {"turn_kind": "turn_kind", "turn": "turn_rad", "lateral": "lateral_m_s", "track": "track"}
+"""Rows of a programme that straight flights do not have, with their keys in a file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +75,12 @@ class Waypoint:
     """Largest vertical speed on the way here [m/s]."""
     hold: float = 0.0
     """Time to stay at the point once it is reached [s]."""
+    turn: tuple[int, float] = (TURN.bank, 0.0)
+    """What turning is asked for: one of ``TURN``, and its value [rad, rad/s, rad]."""
+    lateral: float = 0.0
+    """Airspeed to the right [m/s]; with ``track`` speed over the ground."""
+    track: bool = False
+    """Whether the line over the ground is held, too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,11 +95,23 @@ class Programme:
     """Nacelle angles [rad], shape (points,)."""
     altitude: FloatArray
     """Altitudes [m], shape (points,)."""
+    turn_kind: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """What each point asks for, ``TURN``, shape (points,); none: straight on. Towards a point that asks for the same as
+    the one before it is linear; else bank and turn rate begin at 0, and a heading is asked for at once."""
+    turn: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """Its value [rad, rad/s, rad], shape (points,)."""
+    lateral: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """Airspeeds to the right [m/s], shape (points,); on a track speeds over the ground."""
+    track: FloatArray = field(default_factory=lambda: np.zeros(0))
+    """1 where the way to the point keeps to its line over the ground, shape (points,)."""
 
     def __post_init__(self) -> None:
         """Copy the arrays, make them read-only and refuse what cannot be flown (:class:`InputError`)."""
-        for name in ("time", "airspeed", "nacelle_angle", "altitude"):
+        points = np.size(self.time)
+        for name in ("time", "airspeed", "nacelle_angle", "altitude", *LATERAL_ROWS):
             values = np.array(getattr(self, name), dtype=np.float64).reshape(-1)
+            if name in LATERAL_ROWS and values.size == 0:
+                values = np.zeros(points)
             values.flags.writeable = False
             object.__setattr__(self, name, values)
         _check_times(self.time)
@@ -87,6 +119,10 @@ class Programme:
             ("airspeed", *AIRSPEED_RANGE, to_kt, "kn"),
             ("nacelle_angle", *NACELLE_RANGE, to_deg, "deg"),
             ("altitude", *ALTITUDE_RANGE, float, "m"),
+            ("turn_kind", 0.0, 2.0, float, ""),
+            ("lateral", -LARGEST_LATERAL, LARGEST_LATERAL, to_kt, "kn"),
+            ("track", 0.0, 1.0, float, ""),
+            ("turn", -1e6, 1e6, to_deg, "deg"),
         ):
             values = getattr(self, name)
             if values.shape != self.time.shape:
@@ -102,6 +138,18 @@ class Programme:
                     mend="choose a value in this range",
                 )
         _check_nacelle_rate(self.time, self.nacelle_angle)
+        for kind, largest, what in ((TURN.bank, LARGEST_BANK, "bank"), (TURN.rate, LARGEST_TURN_RATE, "turn rate")):
+            asked = np.where(self.turn_kind == kind, np.abs(self.turn), 0.0)
+            if np.any(asked > largest + _ROUNDING):
+                raise InputError(
+                    f"point {int(np.argmax(asked))} asks for too much {what}", key="programme turn",
+                    value=round(to_deg(float(asked.max())), 3), allowed=f"at most {to_deg(largest):g} deg or deg/s",
+                )  # fmt: skip
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether it asks for no turn and no sideward flight."""
+        return not (self.turn.any() or self.turn_kind.any() or self.lateral.any() or self.track.any())
 
     @classmethod
     def hold(cls, *, airspeed: float, nacelle_angle: float, altitude: float) -> Programme:
@@ -162,7 +210,28 @@ class Programme:
             np.concatenate(([here.airspeed], self.airspeed[later])),
             np.concatenate(([here.nacelle_angle], self.nacelle_angle[later])),
             np.concatenate(([here.altitude], self.altitude[later])),
+            *(np.concatenate(([row], getattr(self, name)[later])) for name, row in self._lateral_at(time).items()),
         )
+
+    def _lateral_at(self, time: float) -> dict[str, float]:
+        """What is asked for beside airspeed, nacelle angle and altitude at a time, row by row."""
+        end = int(np.searchsorted(self.time, time, side="left"))
+        end = min(end, self.time.size - 1)
+        begin = max(end - 1, 0)
+        share = 1.0
+        if end > begin:
+            share = (time - float(self.time[begin])) / float(self.time[end] - self.time[begin])
+        kind, goal = float(self.turn_kind[end]), float(self.turn[end])
+        start = 0.0 if kind != TURN.heading else goal
+        if self.turn_kind[begin] == kind:
+            start = float(self.turn[begin])
+        lateral = float(self.lateral[begin]) + share * float(self.lateral[end] - self.lateral[begin])
+        return {
+            "turn_kind": kind,
+            "turn": start + share * (goal - start),
+            "lateral": lateral,
+            "track": float(self.track[end]),
+        }
 
     def raised(self, height: float) -> Programme:
         """The same programme, flown higher or lower.
@@ -170,7 +239,7 @@ class Programme:
         Args:
             height: Height added to every altitude [m].
         """
-        return Programme(self.time, self.airspeed, self.nacelle_angle, self.altitude + height)
+        return replace(self, altitude=self.altitude + height)
 
     def to_dict(self) -> dict[str, list[float]]:
         """Plain lists (SI) for a file's metadata; :meth:`from_dict` gives the identical programme back."""
@@ -179,6 +248,7 @@ class Programme:
             "airspeed_m_s": self.airspeed.tolist(),
             "nacelle_angle_rad": self.nacelle_angle.tolist(),
             "altitude_m": self.altitude.tolist(),
+            **({} if self.symmetric else {key: getattr(self, name).tolist() for name, key in LATERAL_ROWS.items()}),
         }
 
     @classmethod
@@ -192,7 +262,8 @@ class Programme:
         missing = [name for name in names if name not in data]
         if missing:
             raise InputError("is missing", key=f"programme {missing[0]}", mend=f"give the lists {', '.join(names)}")
-        return cls(*(np.array(data[name], dtype=np.float64) for name in names))
+        lateral = {name: np.array(data[key], dtype=np.float64) for name, key in LATERAL_ROWS.items() if key in data}
+        return cls(*(np.array(data[name], dtype=np.float64) for name in names), **lateral)
 
 
 def timed_programme(waypoints: Sequence[Waypoint], *, nacelle_motion: NacelleMotion = "spread") -> Programme:
@@ -212,7 +283,7 @@ def timed_programme(waypoints: Sequence[Waypoint], *, nacelle_motion: NacelleMot
     if not waypoints:
         raise InputError("has no points", key="programme points", mend="give at least one point")
     first = waypoints[0]
-    rows = [(0.0, first.airspeed, first.nacelle_angle, first.altitude)]
+    rows: list[tuple[float, ...]] = [(0.0, first.airspeed, first.nacelle_angle, first.altitude, *_lateral_of(first))]
     if first.hold > 0.0:
         rows.append((first.hold, *rows[0][1:]))
     for number, (start, end) in enumerate(itertools.pairwise(waypoints), start=1):
@@ -222,13 +293,19 @@ def timed_programme(waypoints: Sequence[Waypoint], *, nacelle_motion: NacelleMot
             share = nacelle_time / duration
             airspeed = start.airspeed + share * (end.airspeed - start.airspeed)
             altitude = start.altitude + share * (end.altitude - start.altitude)
-            rows.append((begin + nacelle_time, airspeed, end.nacelle_angle, altitude))
+            kind, turn, lateral, track = _lateral_of(end)
+            before = start.turn[1] if start.turn[0] == end.turn[0] else 0.0 if kind != TURN.heading else turn
+            halfway = (kind, before + share * (turn - before), start.lateral + share * (lateral - start.lateral), track)
+            rows.append((begin + nacelle_time, airspeed, end.nacelle_angle, altitude, *halfway))
         if duration > 0.0:
-            rows.append((begin + duration, end.airspeed, end.nacelle_angle, end.altitude))
+            rows.append((begin + duration, end.airspeed, end.nacelle_angle, end.altitude, *_lateral_of(end)))
         if end.hold > 0.0:
-            rows.append((begin + duration + end.hold, end.airspeed, end.nacelle_angle, end.altitude))
-    columns = np.array(rows).T
-    return Programme(columns[0], columns[1], columns[2], columns[3])
+            rows.append((begin + duration + end.hold, end.airspeed, end.nacelle_angle, end.altitude, *_lateral_of(end)))
+    return Programme(*np.array(rows).T)
+
+
+def _lateral_of(point: Waypoint) -> tuple[float, float, float, float]:
+    return float(point.turn[0]), point.turn[1], point.lateral, float(point.track)
 
 
 def _segment_time(number: int, start: Waypoint, end: Waypoint) -> tuple[float, float]:

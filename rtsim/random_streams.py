@@ -19,6 +19,10 @@ STREAM_CAMPAIGN = 2
 """Draws of a campaign's specification; branches by class and run."""
 STREAM_SEARCH = 3
 """Draws of the conversion-path search; branches by generation."""
+STREAM_LATERAL_TURBULENCE = 4
+"""White noise of the Dryden filters of side, roll and yaw: those of the others stay what they are."""
+STREAM_LATERAL_PILOT = 5
+"""Noise of the pilot's lateral half."""
 
 LARGEST_SEED = 2**63 - 1
 _WORD = 0xFFFFFFFF

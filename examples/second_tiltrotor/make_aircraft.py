@@ -75,6 +75,7 @@ def scaled(database: Database, size: float) -> Database:
         df_dnacelle=database.df_dnacelle * (x / time),
         attributes={"title": f"made-up tiltrotor, {size:g} x XV-15", "mass_kg": mass * size ** POWERS["kg"]},
         pilot={},
+        lateral=None,
     )
 
 
@@ -95,6 +96,7 @@ def coarse(database: Database) -> Database:
         rotor_speed=database.rotor_speed[n],
         flap=database.flap[np.ix_(v, n)],
         pilot={},
+        lateral=None,
         **arrays,
     )
 

@@ -52,12 +52,23 @@ class AskedCondition:
     """Density altitude, in place of the pressure altitude; None: sea level."""
     cg_in: float | None = None
     """Centre of gravity forward of the aft limit; None: at it."""
+    bank_deg: float | None = None
+    """Bank of a coordinated level turn; None: straight."""
+    sideslip_deg: float | None = None
+    """Sideslip in straight flight; None: none."""
+    lateral_kt: float | None = None
+    """Airspeed to the right; None: none."""
 
     @property
     def solves_nonlinear(self) -> bool:
         """Whether the nonlinear model must be solved: the database holds one condition only."""
         asked = (self.flap_deg, self.rotor_rpm, self.acceleration_kt_s)
-        return self.nonlinear or self.asks_condition or any(value is not None for value in asked)
+        return self.nonlinear or self.asks_condition or self.sideways or any(value is not None for value in asked)
+
+    @property
+    def sideways(self) -> bool:
+        """Whether anything out of the plane of symmetry was asked for."""
+        return bool(self.bank_deg or self.sideslip_deg or self.lateral_kt)
 
     @property
     def asks_condition(self) -> bool:
@@ -76,7 +87,16 @@ _LIMITS: tuple[tuple[str, float, float, str], ...] = (
     ("acceleration_kt_s", -20.0, 20.0, "kn/s"),
     ("density_altitude_ft", -3000.0, 36000.0, "ft"),
     ("cg_in", 0.0, 9.4, "in"),
+    ("bank_deg", -80.0, 80.0, "deg"),
+    ("sideslip_deg", -45.0, 45.0, "deg"),
+    ("lateral_kt", -60.0, 60.0, "kn"),
 )
+
+
+SLOWEST_TURN_KT = 5.0
+"""Airspeed from which a coordinated turn is solved [kn]."""
+TRAVELS = {"lateral_stick_in": "lateral_stick_travel_in", "pedal_in": "pedal_travel_in"}
+"""Half travel of lateral stick and pedals, by their JSON keys."""
 
 
 def _stops(profile: AircraftProfile) -> tuple[tuple[str, float, float, str], ...]:
@@ -113,10 +133,15 @@ def eigenvalues(A: FloatArray) -> list[dict[str, float]]:
     """
     import numpy as np
 
-    return _described(np.linalg.eigvals(A))
+    return described(np.linalg.eigvals(A))
 
 
-def _described(roots: Iterable[complex]) -> list[dict[str, float]]:
+def described(roots: Iterable[complex]) -> list[dict[str, float]]:
+    """Roots as ``eigenvalues`` gives them.
+
+    Args:
+        roots: The roots.
+    """
     return [
         {
             "re": float(root.real),
@@ -150,6 +175,15 @@ def checked(request: AskedCondition) -> AskedCondition:
             )
     if request.altitude_m is not None and request.density_altitude_ft is not None:
         raise InputError("says the same as --altitude-m", key="--density-altitude-ft", mend="give one of the two")
+    asked = [name for name in ("bank_deg", "sideslip_deg", "lateral_kt") if getattr(request, name)]
+    if len(asked) > 1:
+        flags = " and ".join("--" + name.replace("_", "-") for name in asked)
+        raise InputError("asks for several motions at once", key=flags, mend="give one of them")
+    if request.bank_deg and abs(request.airspeed_kt) < SLOWEST_TURN_KT:
+        raise InputError(
+            "a turn with bank needs airspeed: standing still the aircraft turns with its pedals alone",
+            key="--airspeed-kt", value=request.airspeed_kt, allowed=f"{SLOWEST_TURN_KT:g} kn or more with --bank-deg",
+        )  # fmt: skip
     return request
 
 
@@ -179,7 +213,8 @@ def checked_outer_loop(outer_loop: str) -> OuterLoop:
     )
 
 
-def _condition(request: AskedCondition) -> Condition:
+def asked_condition(request: AskedCondition) -> Condition:
+    """The flight condition, in SI."""
     from rtsim.aircraft.points import Condition
     from rtsim.units import deg, kt, rpm
 
@@ -189,15 +224,18 @@ def _condition(request: AskedCondition) -> Condition:
         acceleration=kt(request.acceleration_kt_s or 0.0),
         flap=None if request.flap_deg is None else deg(request.flap_deg),
         rotor_speed=None if request.rotor_rpm is None else rpm(request.rotor_rpm),
+        bank=deg(request.bank_deg or 0.0),
+        sideslip=deg(request.sideslip_deg or 0.0),
+        lateral_airspeed=kt(request.lateral_kt or 0.0),
     )
 
 
-def _asked_aircraft(request: AskedCondition) -> AircraftCondition:
+def asked_aircraft(request: AskedCondition) -> AircraftCondition:
     """Weight, air and centre of gravity: those of the database where nothing else is asked for."""
     from rtsim.aircraft.condition import SHIPPED, AircraftCondition
     from rtsim.units import FOOT, INCH, lb
 
-    base = SHIPPED if request.database is None else AircraftCondition.stored(_lpv(request).database.attributes)
+    base = SHIPPED if request.database is None else AircraftCondition.stored(lpv_aircraft(request).database.attributes)
     changes = {
         "mass": None if request.weight_lb is None else lb(request.weight_lb),
         "density_altitude": request.altitude_m,
@@ -215,20 +253,20 @@ def nonlinear_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
         The result by JSON key, and the trim.
     """
     from rtsim.aircraft.profile import xv15_profile
-    from rtsim.aircraft.variables import INPUTS, OUTPUTS, STATES
+    from rtsim.aircraft.variables import ALL_INPUTS, ALL_OUTPUTS, ALL_STATES
     from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.units import to_deg, to_rpm
 
-    aircraft = Xv15.under(_asked_aircraft(request))
-    condition = _condition(request)
+    aircraft = Xv15.under(asked_aircraft(request))
+    condition = asked_condition(request)
     point = aircraft.trim(condition)
     tables = aircraft.tables
     flap = condition.flap
     if flap is None:
         flap = float(flap_schedule(tables.controls, condition.airspeed, condition.nacelle_angle))
     rotor_speed = tables.configuration.rotor_speed if condition.rotor_speed is None else condition.rotor_speed
-    values = _named(point, STATES, INPUTS, OUTPUTS)
+    values = _named(point, ALL_STATES, ALL_INPUTS, ALL_OUTPUTS)
     configuration = (to_deg(flap), to_rpm(float(rotor_speed)))
     return _trim_result(request, xv15_profile(), values, configuration, point.converged), point
 
@@ -244,7 +282,7 @@ def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     """
     from rtsim.units import deg, kt, to_deg, to_rpm
 
-    aircraft = _lpv(request)
+    aircraft = lpv_aircraft(request)
     airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
     point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
     database = aircraft.database
@@ -266,7 +304,7 @@ def solvable(request: AskedCondition) -> AskedCondition:
     from rtsim.units import deg, kt
 
     if request.database is not None:
-        profile = _lpv(request).database.profile
+        profile = lpv_aircraft(request).database.profile
         if request.solves_nonlinear and not profile.is_xv15:
             raise InputError(
                 f"there is no nonlinear model of the {profile.name}",
@@ -276,12 +314,13 @@ def solvable(request: AskedCondition) -> AskedCondition:
         return request
     if request.solves_nonlinear:
         return request
-    if _lpv(request).trim(airspeed=kt(request.airspeed_kt), nacelle=deg(request.nacelle_deg)).converged:
+    if lpv_aircraft(request).trim(airspeed=kt(request.airspeed_kt), nacelle=deg(request.nacelle_deg)).converged:
         return request
     return dataclasses.replace(request, nonlinear=True)
 
 
-def _lpv(request: AskedCondition) -> LpvAircraft:
+def lpv_aircraft(request: AskedCondition) -> LpvAircraft:
+    """The LPV aircraft that is asked."""
     from rtsim.lpv.aircraft import load_aircraft
 
     return load_aircraft(request.database)
@@ -295,7 +334,9 @@ def _named(
 ) -> dict[str, float]:
     values: dict[str, float] = {}
     for variables, vector in ((states, point.x), (inputs, point.u), (outputs, point.y)):
-        values |= {variable.name: float(value) for variable, value in zip(variables, vector, strict=True)}
+        # A symmetric trim has the symmetric variables alone; the others are zero.
+        values |= {variable.name: 0.0 for variable in variables}
+        values |= {variable.name: float(value) for variable, value in zip(variables, vector, strict=False)}
     return values
 
 
@@ -311,7 +352,7 @@ def _trim_result(
     from rtsim.units import HORSEPOWER, INCH_POUND, POUND_FORCE, deg, kt, to_deg
 
     flap_deg, rotor_rpm = configuration
-    corridor = load_corridor("design", profile).in_true_airspeed(_asked_aircraft(request).true_over_calibrated)
+    corridor = load_corridor("design", profile).in_true_airspeed(asked_aircraft(request).true_over_calibrated)
     solved = {
         "pitch_deg": to_deg(values["pitch"]),
         "stick_in": values["stick"] * _stick_travel(profile),
@@ -324,6 +365,7 @@ def _trim_result(
         "engine_power_shp": values["power"] / HORSEPOWER / transmission_efficiency(profile),
         "mast_torque_inlb": values["torque"] / INCH_POUND,
         "flapping_deg": to_deg(math.hypot(values["flap_1c"], values["flap_1s"])),
+        **_lateral_result(values),
     }
     return {
         "airspeed_kt": request.airspeed_kt,
@@ -339,6 +381,36 @@ def _trim_result(
     }
 
 
+def _lateral_result(values: dict[str, float]) -> dict[str, float]:
+    """What a trim is like out of the plane of symmetry, by JSON key."""
+    from rtsim.aircraft.xv15.data_reader import read_lateral_data
+    from rtsim.units import INCH_POUND, to_deg
+
+    travel = read_lateral_data()["controls"]
+    value = values.get
+    u, v, w = (value(name, 0.0) for name in ("u", "v", "w"))
+
+    def flapping(side: float) -> float:
+        along, across = (values[n] + side * value(f"{n}_difference", 0.0) for n in ("flap_1c", "flap_1s"))
+        return to_deg(math.hypot(along, across))
+
+    hands = {key: value(key.removesuffix("_in"), 0.0) * travel[name] for key, name in TRAVELS.items()}
+    return {
+        "bank_deg": to_deg(value("bank", 0.0)),
+        "sideslip_deg": to_deg(math.atan2(v, math.hypot(u, w))) if v != 0.0 else 0.0,
+        **hands,
+        "aileron_deg": to_deg(value("aileron", 0.0)),
+        "rudder_deg": to_deg(value("rudder", 0.0)),
+        "differential_collective_deg": to_deg(value("collective_difference", 0.0)),
+        "differential_cyclic_deg": to_deg(value("cyclic_difference", 0.0)),
+        "flapping_right_deg": flapping(1.0),
+        "flapping_left_deg": flapping(-1.0),
+        "mast_torque_right_inlb": (values["torque"] + value("torque_difference", 0.0)) / INCH_POUND,
+        "mast_torque_left_inlb": (values["torque"] - value("torque_difference", 0.0)) / INCH_POUND,
+        "load_factor": values["load_factor"],
+    }
+
+
 def _beyond_limits(solved: dict[str, float], profile: AircraftProfile) -> list[str]:
     """What a trim asks of the aircraft that it cannot give, in words: the equations know no stops."""
     found = []
@@ -347,6 +419,25 @@ def _beyond_limits(solved: dict[str, float], profile: AircraftProfile) -> list[s
             name = key.removesuffix(f"_{unit}").removesuffix("_fraction").replace("_", " ")
             found.append(f"{name} {solved[key]:.3g} {unit}".rstrip() + f" (limits {low:g} to {high:g})")
     return found
+
+
+STOPPED = {"stick": "the stick", "lateral_stick": "the lateral stick", "pedal": "a pedal"}
+"""Controls that end a branch of trims, in words."""
+
+
+def _reached(request: AskedCondition, point: TrimPoint) -> str:
+    """How far the branch went."""
+    from rtsim.aircraft.variables import STATE
+    from rtsim.units import to_deg, to_kt
+
+    if len(point.x) <= STATE.v:
+        return ""
+    u, v, w, bank = (float(point.x[place]) for place in (STATE.u, STATE.v, STATE.w, STATE.bank))
+    if request.bank_deg:
+        return f" (it ends at {to_deg(bank):.1f} deg)"
+    if request.sideslip_deg:
+        return f" (it ends at {to_deg(math.atan2(v, math.hypot(u, w))):.1f} deg)"
+    return f" (it ends at {to_kt(v):.1f} kn)"
 
 
 def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
@@ -359,7 +450,16 @@ def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
         The error to raise.
     """
     where = f"{request.airspeed_kt:g} kn at nacelle {request.nacelle_deg:g} deg"
-    left = f"; '{point.unclosed}' does not close" if getattr(point, "unclosed", "") else ""
+    for name, words in (
+        ("bank_deg", "bank {:g} deg"),
+        ("sideslip_deg", "sideslip {:g} deg"),
+        ("lateral_kt", "{:g} kn to the right"),
+    ):
+        if getattr(request, name):
+            where += ", " + words.format(getattr(request, name)) + _reached(request, point)
+    if point.unclosed in STOPPED:
+        where += f": {STOPPED[point.unclosed]} would pass its stop"
+    left = f"; '{point.unclosed}' does not close" if point.unclosed not in {"", *STOPPED} else ""
     mend = "see where the aircraft flies with 'rtsim corridor'"
     if not request.solves_nonlinear:
         mend += ", or solve exactly there with --nonlinear"
@@ -379,12 +479,12 @@ def nonlinear_model(request: AskedCondition) -> dict[str, Any]:
     from rtsim.aircraft.xv15.model import Xv15
     from rtsim.lpv.building.xv15_grid import flown_model
 
-    aircraft, condition = Xv15.under(_asked_aircraft(request)), _condition(request)
+    aircraft, condition = Xv15.under(asked_aircraft(request)), asked_condition(request)
     point = aircraft.trim(condition)
     if not point.converged:
         raise no_trim(request, point)
     model = flown_model(aircraft, condition, point)
-    return _model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
+    return model_result((STATES, INPUTS, OUTPUTS), (model.A, model.B, model.C, model.D))
 
 
 def database_model(request: AskedCondition) -> dict[str, Any]:
@@ -398,13 +498,13 @@ def database_model(request: AskedCondition) -> dict[str, Any]:
     """
     from rtsim.units import deg, kt
 
-    aircraft = _lpv(request)
+    aircraft = lpv_aircraft(request)
     airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
     matrices = aircraft.matrices(airspeed=airspeed, nacelle=nacelle)
     if not aircraft.is_valid(airspeed=airspeed, nacelle=nacelle):
         raise no_trim(request, aircraft.trim(airspeed=airspeed, nacelle=nacelle))
     database = aircraft.database
-    return _model_result((database.states, database.inputs, database.outputs), matrices)
+    return model_result((database.states, database.inputs, database.outputs), matrices)
 
 
 def closed_loop_model(request: AskedCondition, outer_loop: str) -> dict[str, Any]:
@@ -433,7 +533,7 @@ def closed_loop_model(request: AskedCondition, outer_loop: str) -> dict[str, Any
             "--database names one for another condition",
         )
     chosen = checked_outer_loop(outer_loop)
-    aircraft = _lpv(request)
+    aircraft = lpv_aircraft(request)
     airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
     point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
     if not point.converged:
@@ -467,16 +567,22 @@ def closed_loop_model(request: AskedCondition, outer_loop: str) -> dict[str, Any
         "D": np.zeros((0, 0)),
         "dt_s": loop.dt,
         "outer_loop": outer_loop,
-        "eigenvalues": _described(loop.eigenvalues()),
+        "eigenvalues": described(loop.eigenvalues()),
         "growth_rad_s": growth,
         "stable": growth < 0.0,
     }
 
 
-def _model_result(
+def model_result(
     variables: tuple[tuple[Variable, ...], tuple[Variable, ...], tuple[Variable, ...]],
     matrices: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> dict[str, Any]:
+    """A linear model by JSON key.
+
+    Args:
+        variables: States, inputs and outputs.
+        matrices: A, B, C, D.
+    """
     kinds = ("states", "inputs", "outputs")
     return {
         **{kind: [variable.name for variable in row] for kind, row in zip(kinds, variables, strict=True)},

@@ -133,7 +133,14 @@ class _Frame:
         return after
 
 
-def _jacobian(function: Callable[[FloatArray], FloatArray], at: FloatArray, step: FloatArray) -> FloatArray:
+def jacobian(function: Callable[[FloatArray], FloatArray], at: FloatArray, step: FloatArray) -> FloatArray:
+    """Jacobian by central differences.
+
+    Args:
+        function: Of a vector.
+        at: Where.
+        step: Step of each component.
+    """
     columns = []
     for k in range(at.size):
         ahead, behind = at.copy(), at.copy()
@@ -143,8 +150,13 @@ def _jacobian(function: Callable[[FloatArray], FloatArray], at: FloatArray, step
     return np.array(columns).T
 
 
-def _trim_state(database: Database, condition: FrozenCommand) -> tuple[FloatArray, FloatArray]:
-    """Interpolated trim state and controls of the condition."""
+def trim_state(database: Database, condition: FrozenCommand) -> tuple[FloatArray, FloatArray]:
+    """Interpolated trim state and controls of the condition.
+
+    Args:
+        database: The trims.
+        condition: The command.
+    """
     level = database.level_layer
     layers = database.layer_acceleration
 
@@ -187,7 +199,7 @@ def frozen_loop(
     """
     lpv, pilot = tables if tables is not None else _tables(database, outer_loop, dt, form)
     frame = _Frame(database, lpv, pilot, condition, dt)
-    x, u = _trim_state(database, condition)
+    x, u = trim_state(database, condition)
     state = np.zeros(kernels.pilot_state_size(pilot))
     # Between grid points the trims of aircraft and pilot come from the same tables and agree to second order of the
     # cell; on an accelerated layer the point is none of rest, and the map's derivative there is what is wanted.
@@ -196,11 +208,11 @@ def frozen_loop(
     step_x, step_u = np.full(x.size, _STEP), np.full(present.size, _STEP)
     step_s = np.full(state.size, _STEP)
     return FrozenLoop(
-        plant_a=_jacobian(lambda v: frame.plant(v, present), x, step_x),
-        plant_b=_jacobian(lambda v: frame.plant(x, v), present, step_u),
-        pilot_a=_jacobian(lambda v: frame.advance(x, v), state, step_s),
-        pilot_b=_jacobian(lambda v: frame.advance(v, state), x, step_x),
-        pilot_c=_jacobian(lambda v: frame.output(x, v), state, step_s),
+        plant_a=jacobian(lambda v: frame.plant(v, present), x, step_x),
+        plant_b=jacobian(lambda v: frame.plant(x, v), present, step_u),
+        pilot_a=jacobian(lambda v: frame.advance(x, v), state, step_s),
+        pilot_b=jacobian(lambda v: frame.advance(v, state), x, step_x),
+        pilot_c=jacobian(lambda v: frame.output(x, v), state, step_s),
         dt=dt,
         names=tuple(variable.name for variable in database.states),
     )

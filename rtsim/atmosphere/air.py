@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
@@ -10,6 +12,7 @@ from rtsim.atmosphere import dryden_kernels as dryden
 from rtsim.atmosphere import gust_kernels as kernels
 from rtsim.atmosphere.gust_kernels import GustTables
 from rtsim.atmosphere.specification import SEVERITY_WIND, AirSpecification, Gust, GustShape, Severity, Turbulence
+from rtsim.atmosphere.wind_kernels import WindTables
 from rtsim.errors import InputError
 from rtsim.units import FOOT
 
@@ -56,30 +59,51 @@ def gust_tables(air: AirSpecification, profile: AircraftProfile | None = None) -
     return GustTables(turbulence)
 
 
+def wind_tables(
+    speed: float, wind_from: float | None, *, heading: float, reference_height: float, felt: bool
+) -> WindTables:
+    """Give the steady wind as the kernels read it.
+
+    Args:
+        speed: Wind [m/s].
+        wind_from: Where it comes from, clockwise from north [rad]; None: from behind.
+        heading: Heading at the start [rad].
+        reference_height: Height at which it blows as given [m]; 0: at every height.
+        felt: The aircraft also moves sideways through the air.
+    """
+    ahead, right = speed, 0.0
+    if wind_from is not None:
+        ahead, right = -speed * math.cos(wind_from - heading), -speed * math.sin(wind_from - heading)
+    return WindTables(float(ahead), float(right), float(heading), float(reference_height), float(felt))
+
+
 def new_gust_state(air: AirSpecification, normals: FloatArray | None = None) -> FloatArray:
     """Give the gust state before the first ``gust_step`` (which has ``dt = 0``).
 
     Args:
         air: What the air does.
-        normals: Three standard normals that set the filters in their stationary state; needed where the air is
-            turbulent from the start.
+        normals: Standard normals that set the filters in their stationary state, three, or six with lateral
+            turbulence; needed where the air is turbulent from the start.
 
     Returns:
         The state, shape (SLOTS + slots * SLOT_SIZE,), with room for ``LIVE_SLOTS`` more gusts.
     """
     state = np.zeros(kernels.GUST.size + kernels.SLOT.size * (len(air.gusts) + LIVE_SLOTS))
+    state[dryden.TURBULENCE.lateral] = float(air.lateral)
     for number, gust in enumerate(air.gusts):
         _fill_slot(state, kernels.GUST.size + number * kernels.SLOT.size, gust)
     if air.turbulence is not None and air.turbulent:
         if normals is None:
-            raise ValueError("turbulence needs three standard normals for its first state")
+            raise ValueError("turbulence needs three or six standard normals for its first state")
         set_turbulence(state, air.turbulence, normals)
     return state
 
 
 def normals_needed(state: FloatArray) -> int:
-    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3."""
-    return kernels.NORMALS_PER_FRAME if state[dryden.TURBULENCE.active] != 0.0 else 0
+    """Give the standard normals that each ``gust_step`` takes: 0 until there has been turbulence, then 3, or 6."""
+    if state[dryden.TURBULENCE.active] == 0.0:
+        return 0
+    return kernels.NORMALS_PER_FRAME * (2 if state[dryden.TURBULENCE.lateral] != 0.0 else 1)
 
 
 def set_turbulence(state: FloatArray, turbulence: Turbulence, normals: FloatArray) -> None:
@@ -88,12 +112,14 @@ def set_turbulence(state: FloatArray, turbulence: Turbulence, normals: FloatArra
     Args:
         state: Gust state, changed in place.
         turbulence: What it becomes; its ``fade_in`` is the time of the change.
-        normals: Three standard normals, used only where there was no turbulence before.
+        normals: Three standard normals, or six, used only where there was no turbulence before.
     """
     if state[dryden.TURBULENCE.active] == 0.0:
         if turbulence.wind_at_20_ft == 0.0:
             return
-        state[dryden.TURBULENCE.u], state[dryden.TURBULENCE.w_1], state[dryden.TURBULENCE.w_2] = normals
+        state[dryden.TURBULENCE.u], state[dryden.TURBULENCE.w_1], state[dryden.TURBULENCE.w_2] = normals[:3]
+        if state[dryden.TURBULENCE.lateral] != 0.0:
+            state[dryden.TURBULENCE.v_1], state[dryden.TURBULENCE.v_2], state[dryden.TURBULENCE.p] = normals[3:]
         state[dryden.TURBULENCE.active] = state[kernels.GUST.busy] = 1.0
     target = turbulence.wind_at_20_ft
     state[dryden.TURBULENCE.wind_target] = target
@@ -132,6 +158,7 @@ def _fill_slot(state: FloatArray, slot: int, gust: Gust) -> None:
     state[slot + kernels.SLOT.start] = gust.start
     state[slot + kernels.SLOT.first] = gust.ahead
     state[slot + kernels.SLOT.second] = gust.below
+    state[slot + kernels.SLOT.third] = gust.lateral
     state[slot + kernels.SLOT.extent] = extent
     state[slot + kernels.SLOT.by_length] = 0.0 if gust.length is None else 1.0
     state[slot + kernels.SLOT.body] = 1.0 if gust.axes == "body" else 0.0

@@ -38,6 +38,12 @@ TURBULENCE = Places(
     "lag",  # vertical gust behind the lag of the pitch gust [m/s]
     "w",  # vertical gust of the present frame [m/s]
     "active",  # 1 once there has been turbulence: normals are drawn every frame from then on
+    "lateral",  # 1: gusts from the side, in roll and in yaw too
+    "v_1",  # states of the filter from the side
+    "v_2",
+    "p",  # state of the roll filter
+    "v_lag",  # gust from the side behind the lag of the yaw gust [m/s]
+    "v",  # gust from the side of the present frame [m/s]
 )
 """Places in the gust state's turbulence section."""
 
@@ -50,7 +56,7 @@ class TurbulenceTables(NamedTuple):
     """Parameters of the turbulence; read-only."""
 
     span: float
-    """Wing span, sets the lag of the pitch gust [m]."""
+    """Wing span, sets the lags of the pitch and the yaw gust and how far the roll gust reaches [m]."""
     minimum_speed: float
     """Speed through the frozen field where the aircraft is slower [m/s]."""
     altitude: FloatArray
@@ -191,22 +197,75 @@ def advance_lag(lag: float, before: float, now: float, a: float) -> float:
 
 
 @inner_kernel
+def roll_intensity(span: float, sigma_w: float, scale_w: float) -> float:
+    """Root-mean-square roll gust: the integral of its spectrum (MIL-F-8785C 3.7.1.4) [rad/s].
+
+    Args:
+        span: Wing span [m].
+        sigma_w: Vertical intensity [m/s].
+        scale_w: Vertical scale length [m].
+    """
+    share = math.pi * scale_w / (4.0 * span)
+    return sigma_w * math.sqrt(0.8 * share ** (1.0 / 3.0) * math.pi**2 / (8.0 * span * scale_w))
+
+
+@inner_kernel
+def lateral_step(
+    tables: TurbulenceTables,
+    state: FloatArray,
+    scales: tuple[float, float, float, float],
+    distance: float,
+    normals: FloatArray,
+) -> tuple[float, float, float]:
+    """Move the turbulence of side, roll and yaw on by a distance and give it there.
+
+    From the side intensity and scale length are the longitudinal ones at every height, and the form is the vertical
+    one (MIL-F-8785C 3.7.2.1, 3.7.3.4).
+
+    Args:
+        state: State, updated in place.
+        scales: What ``turbulence_scales`` gives.
+        distance: Way through the air since the frame before; 0 at the start of the flight [m].
+        normals: Standard normals; the last three are used.
+
+    Returns:
+        Gust from the right [m/s], roll and yaw gust [rad/s].
+    """  # fmt: skip
+    sigma_v, sigma_w, scale_v, scale_w = scales
+    state[TURBULENCE.v_1], state[TURBULENCE.v_2] = advance_second_order(
+        state[TURBULENCE.v_1], state[TURBULENCE.v_2], distance / scale_v, normals[3], normals[4]
+    )
+    reach = 4.0 * tables.span / math.pi
+    state[TURBULENCE.p] = advance_first_order(state[TURBULENCE.p], distance / reach, normals[5])
+    side = sigma_v * (_W_FIRST * state[TURBULENCE.v_1] + _W_SECOND * state[TURBULENCE.v_2])
+    behind = 3.0 * tables.span / math.pi
+    if distance > 0.0:
+        state[TURBULENCE.v_lag] = advance_lag(state[TURBULENCE.v_lag], state[TURBULENCE.v], side, distance / behind)
+    else:
+        state[TURBULENCE.v_lag] = side
+    state[TURBULENCE.v] = side
+    roll = roll_intensity(tables.span, sigma_w, scale_w) * state[TURBULENCE.p]
+    return side, roll, (side - state[TURBULENCE.v_lag]) / behind
+
+
+@inner_kernel
 def turbulence_step(
     tables: TurbulenceTables, state: FloatArray, speed: float, altitude: float, dt: float, normals: FloatArray
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, float, float, float]:
     """Move the turbulence on by a frame and give it there.
 
     Args:
         state: State, updated in place; its first ``TURBULENCE.size`` entries are used.
         speed: Airspeed; its size counts, and at least ``minimum_speed`` [m/s].
         dt: Length of the frame that ends now; 0 at the start of the flight [s].
-        normals: Three standard normals; not read without turbulence.
+        normals: Three standard normals, six with lateral turbulence; not read without turbulence.
 
     Returns:
-        Gust from ahead and from below [m/s] and pitch gust [rad/s]; exactly 0.0 without turbulence.
+        Gust from ahead and from below [m/s], pitch gust [rad/s], gust from the right [m/s], roll and yaw gust [rad/s];
+        exactly 0.0 without turbulence, the last three without lateral turbulence.
     """
     if state[TURBULENCE.active] == 0.0:
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     change = state[TURBULENCE.wind_rate] * dt
     wind = state[TURBULENCE.wind]
     if wind < state[TURBULENCE.wind_target]:
@@ -214,7 +273,8 @@ def turbulence_step(
     elif wind > state[TURBULENCE.wind_target]:
         wind = max(state[TURBULENCE.wind_target], wind - change)
     state[TURBULENCE.wind] = wind
-    sigma_u, sigma_w, scale_u, scale_w = turbulence_scales(tables, altitude, wind)
+    scales = turbulence_scales(tables, altitude, wind)
+    sigma_u, sigma_w, scale_u, scale_w = scales
     through = max(abs(speed), tables.minimum_speed)
     distance = through * dt
     state[TURBULENCE.u] = advance_first_order(state[TURBULENCE.u], distance / scale_u, normals[0])
@@ -228,8 +288,11 @@ def turbulence_step(
     else:
         state[TURBULENCE.lag] = vertical
     state[TURBULENCE.w] = vertical
+    side = roll = yaw = 0.0
+    if state[TURBULENCE.lateral] != 0.0:
+        side, roll, yaw = lateral_step(tables, state, scales, distance, normals)
     if wind == 0.0 and state[TURBULENCE.wind_target] == 0.0:
-        # Calmed down: the gusts themselves are over, the pitch gust's lag with them.
-        state[TURBULENCE.lag] = 0.0
-        return 0.0, 0.0, 0.0
-    return sigma_u * state[TURBULENCE.u], vertical, -(vertical - state[TURBULENCE.lag]) / reach
+        # Calmed down: the gusts themselves are over, the lags of pitch and yaw gust with them.
+        state[TURBULENCE.lag] = state[TURBULENCE.v_lag] = 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return sigma_u * state[TURBULENCE.u], vertical, -(vertical - state[TURBULENCE.lag]) / reach, side, roll, yaw

@@ -72,6 +72,8 @@ class Gust:
     """Amplitude from ahead, a headwind positive; with ``axes="body"`` along body x [m/s]."""
     below: float = 0.0
     """Amplitude from below, an updraft positive; with ``axes="body"`` along body z [m/s]."""
+    lateral: float = 0.0
+    """Amplitude from the right; with ``axes="body"`` along body y [m/s]."""
     shape: GustShape = "one-minus-cosine"
     """``one-minus-cosine`` rises and falls, ``build-up`` (half a cosine) and ``ramp`` (straight) rise and stay."""
     duration: float | None = None
@@ -79,12 +81,12 @@ class Gust:
     length: float | None = None
     """The same as a distance flown [m]; one of the two is given."""
     axes: GustAxes = "earth"
-    """``earth``: horizontal and vertical, turned into body axes by the pitch attitude; ``body``: as given."""
+    """``earth``: horizontal and vertical, turned into body axes by pitch and bank; ``body``: as given."""
 
     def __post_init__(self) -> None:
         """Refuse what is out of range or contradicts itself (:class:`InputError`)."""
         _within("start", self.start, 0.0, 36_000.0, "s")
-        for name, amplitude in (("ahead", self.ahead), ("below", self.below)):
+        for name, amplitude in (("ahead", self.ahead), ("below", self.below), ("lateral", self.lateral)):
             _within(name, amplitude, -LARGEST_GUST, LARGEST_GUST, "m/s")
         for name, value, allowed in (
             ("shape", self.shape, get_args(GustShape)),
@@ -113,6 +115,8 @@ class AirSpecification:
     """Discrete gusts, added where they overlap."""
     minimum_speed: float = MINIMUM_SPEED
     """Slowest passage through the frozen field, for turbulence and for gusts given by length [m/s]."""
+    lateral: bool = False
+    """Turbulence blows from the side, in roll and in yaw too, whenever there is any."""
 
     def __post_init__(self) -> None:
         """Refuse what is out of range (:class:`InputError`)."""

@@ -20,6 +20,7 @@ from rtsim.analysis.flight_condition import (
     nonlinear_trim,
     solvable,
 )
+from rtsim.analysis.lateral_condition import checked_axis, joined, lateral_closed_loop, lateral_model
 from rtsim.cli.output import console, emit_json, results
 
 _AIRSPEED = typer.Option(help="Horizontal airspeed [kn].")
@@ -35,6 +36,12 @@ _ACCELERATION = typer.Option(help="Acceleration in level flight [kn/s]; solves t
 _DATABASE = typer.Option(help="Another LPV database than the shipped one (.nc or .mat).")
 _CLOSED_LOOP = typer.Option("--closed-loop", help="Aircraft, pilot and outer loops together, sampled as flown.")
 _OUTER_LOOP = typer.Option(help="How the pilot holds airspeed and altitude: integrators or pi (with --closed-loop).")
+_BANK = typer.Option(help="Bank angle of a coordinated level turn, right positive [deg]; solves the nonlinear model.")
+_SLIP = typer.Option(
+    help="Sideslip in straight flight, wind from the right positive [deg]; solves the nonlinear model."
+)
+_SIDE = typer.Option(help="Airspeed to the right, besides the one ahead [kn]; solves the nonlinear model.")
+_AXIS = typer.Option(help="Motion in the plane of symmetry, out of it, or both: longitudinal, lateral or both.")
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 
 
@@ -56,6 +63,9 @@ def trim_command(
     density_altitude_ft: Annotated[float | None, _DENSITY] = None,
     cg_in: Annotated[float | None, _CENTRE] = None,
     acceleration_kt_s: Annotated[float | None, _ACCELERATION] = None,
+    bank_deg: Annotated[float | None, _BANK] = None,
+    sideslip_deg: Annotated[float | None, _SLIP] = None,
+    lateral_kt: Annotated[float | None, _SIDE] = None,
     database: Annotated[Path | None, _DATABASE] = None,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
@@ -64,10 +74,15 @@ def trim_command(
     From the LPV database; with --nonlinear, or with any of --flap-deg, --rotor-rpm, --weight-lb, --altitude-m,
     --density-altitude-ft, --cg-in and --acceleration-kt-s, solved by the nonlinear model at exactly that condition. At
     the edge of what the database covers, where a grid point around has no trim, the nonlinear model is asked too.
+
+    Turns, sideslip and sideward flight (one of --bank-deg, --sideslip-deg, --lateral-kt) are solved by the nonlinear
+    model; a wind from any direction is an airspeed ahead (negative: from behind) and one to the right. Where there is
+    no such flight it says how far there is one and what ends it. Example: rtsim trim --airspeed-kt 80 --nacelle-deg 75
+    --bank-deg 30.
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
-                       acceleration_kt_s, database, density_altitude_ft, cg_in)
+                       acceleration_kt_s, database, density_altitude_ft, cg_in, bank_deg, sideslip_deg, lateral_kt)
     )  # fmt: skip
     request = solvable(request)
     result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
@@ -78,7 +93,7 @@ def trim_command(
     if result["beyond_limits"]:
         console.print(f"This trim is beyond the aircraft: {', '.join(result['beyond_limits'])}.", soft_wrap=True)
     if not json:
-        _print_trim(result)
+        _print_trim(result, sideways=request.sideways)
 
 
 def linearize_command(
@@ -94,6 +109,7 @@ def linearize_command(
     cg_in: Annotated[float | None, _CENTRE] = None,
     acceleration_kt_s: Annotated[float | None, _ACCELERATION] = None,
     database: Annotated[Path | None, _DATABASE] = None,
+    axis: Annotated[str, _AXIS] = "longitudinal",
     closed_loop: Annotated[bool, _CLOSED_LOOP] = False,
     outer_loop: Annotated[str, _OUTER_LOOP] = "integrators",
     json: Annotated[bool, _JSON] = False,
@@ -104,17 +120,27 @@ def linearize_command(
     --density-altitude-ft, --cg-in and --acceleration-kt-s, from the nonlinear model trimmed at exactly that condition.
     With --closed-loop, aircraft, pilot and outer loops as flown: A is the map over one 4 ms frame, and the eigenvalues
     are log(z)/dt.
+
+    About straight flight the motion in the plane of symmetry and the one out of it do not meet: --axis says which is
+    shown. The lateral states are v, p, r, bank, heading, the half differences right less left of the two rotors' states
+    and of their pitch, aileron and rudder.
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
                        acceleration_kt_s, database, density_altitude_ft, cg_in)
     )  # fmt: skip
     checked_outer_loop(outer_loop)
+    wanted = checked_axis(axis)
     if closed_loop:
-        model = closed_loop_model(request, outer_loop)
+        model = lateral_closed_loop(request) if wanted == "lateral" else closed_loop_model(request, outer_loop)
+        if wanted == "both":
+            model = joined(model, lateral_closed_loop(request))
     else:
         request = solvable(request)
         model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
+        if wanted != "longitudinal":
+            lateral = lateral_model(request)
+            model = lateral if wanted == "lateral" else joined(model, lateral)
         model["eigenvalues"] = eigenvalues(model["A"])
     result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
     if json:
@@ -141,7 +167,25 @@ _TRIM_ROWS = (
 """What people are shown of a trim: key, words, unit, decimals."""
 
 
-def _print_trim(result: dict[str, Any]) -> None:
+_SIDEWAYS_ROWS = (
+    ("bank_deg", "bank, right positive", "deg", 2),
+    ("sideslip_deg", "sideslip, wind from the right positive", "deg", 2),
+    ("load_factor", "load factor", "-", 3),
+    ("lateral_stick_in", "lateral stick, right positive", "in", 2),
+    ("pedal_in", "pedals, right positive", "in", 2),
+    ("aileron_deg", "aileron, right one up positive", "deg", 2),
+    ("rudder_deg", "rudder, positive turns the nose right", "deg", 2),
+    ("differential_collective_deg", "half difference of collective, right less left", "deg", 2),
+    ("differential_cyclic_deg", "half difference of cyclic, right less left", "deg", 2),
+    ("flapping_right_deg", "flapping of the right rotor", "deg", 2),
+    ("flapping_left_deg", "flapping of the left rotor", "deg", 2),
+    ("mast_torque_right_inlb", "torque of the right mast", "in lb", 0),
+    ("mast_torque_left_inlb", "torque of the left mast", "in lb", 0),
+)
+"""What they are shown besides of a turn, of sideslip and of sideward flight."""
+
+
+def _print_trim(result: dict[str, Any], *, sideways: bool) -> None:
     from rich.table import Table
 
     table = Table(
@@ -149,7 +193,7 @@ def _print_trim(result: dict[str, Any]) -> None:
     )
     for justify in ("left", "right", "left"):
         table.add_column(justify=justify)
-    for key, words, unit, decimals in _TRIM_ROWS:
+    for key, words, unit, decimals in (*_TRIM_ROWS, *(_SIDEWAYS_ROWS if sideways else ())):
         table.add_row(words, f"{round(result[key], decimals) + 0.0:,.{decimals}f}".replace(",", " "), unit)
     results.print(table)
     inside = "inside" if result["inside_corridor"] else "OUTSIDE"
@@ -170,6 +214,9 @@ def _print_model(result: dict[str, Any]) -> None:
     if "stable" in result:
         verdict = "stable" if result["stable"] else "unstable"
         results.print(f"The loop as flown is {verdict}: slowest growth {result['growth_rad_s']:+.4f} rad/s")
+    for hand, margin in result.get("margins", {}).items():
+        phase = f"{margin['phase_deg']:.0f} deg at {margin['crossover_rad_s']:.2f} rad/s"
+        results.print(f"Margins of {hand.replace('_', ' ')}: {phase}, {margin['gain_db']:.1f} dB")
     for kind in ("states", "inputs", "outputs"):
         if result[kind]:
             named = [pair for pair in zip(result[kind], result["units"][kind], strict=True) if pair[0][:6] != "pilot_"]

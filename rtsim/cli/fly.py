@@ -79,6 +79,15 @@ def fly_command(
             help="Dryden turbulence (MIL-F-8785C).", show_default="the scenario's, none", rich_help_panel="Air"
         ),
     ] = None,
+    lateral_turbulence: Annotated[
+        bool | None,
+        typer.Option(
+            "--lateral-turbulence/--no-lateral-turbulence",
+            help="Let turbulence blow from the side, in roll and in yaw too.",
+            show_default="the scenario's, off",
+            rich_help_panel="Air",
+        ),
+    ] = None,
     speed: Annotated[
         str, typer.Option(help="Multiple of real time, or max: headless, as fast as it goes.", rich_help_panel="Loop")
     ] = "1",
@@ -199,6 +208,7 @@ def fly_command(
     overrides = Overrides(
         **options,
         turbulence=turbulence,
+        lateral_turbulence=lateral_turbulence,
         duration=duration,
         start=start,
         airspeed=None if airspeed_kt is None else kt(airspeed_kt),

@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 
 from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVERNOR, MEMORY
+from rtsim.aircraft.motion_kernels import moves_sideways
 from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
+from rtsim.atmosphere.wind_kernels import level_motion, level_speed, meet_wind, over_ground, wind_along, wind_share
 from rtsim.corridor.corridor_kernels import corridor_level_step
 from rtsim.faults.fault_kernels import FAULT, fault_actuators_end, fault_nacelle_rate
 from rtsim.frame import COLUMN, QUANTITY
@@ -19,10 +21,12 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
 from rtsim.kernels.ramp_filter_kernels import critically_damped_ramp
 from rtsim.loop.data import CHANNEL, CLOCK, END, HELD, KNOWN, MODE, MOTION, PART, PROGRAMME, REFERENCE, STATION, Flight
+from rtsim.loop.lateral_reference_kernels import move_lateral_reference
 from rtsim.loop.observe_kernels import programme_at, programmed
 from rtsim.nacelle.automatic_kernels import scheduled_angle
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, nacelle_assigned_rate, nacelle_effective_rate, nacelle_path
-from rtsim.pilot.layout_kernels import TARGET
+from rtsim.pilot.lateral_kernels import WANTED
+from rtsim.pilot.layout_kernels import S_FILTERED, TARGET
 from rtsim.protection import law_data as law
 from rtsim.protection.law_kernels import law_apply, law_due
 from rtsim.systems.drive_kernels import (
@@ -42,11 +46,13 @@ from rtsim.units import DEGREE, HORSEPOWER, KNOT
 GENTLE_SINK_RATE, HARD_SINK_RATE = 1.5, 3.0
 """Sink rates at touchdown up to which a landing counts as gentle or as hard [m/s]; beyond it is a crash. Ours: about
 300 and 600 ft/min, the usual normal and limit touchdown rates of helicopters (14 CFR 29.725 drops at 6.5 ft/s)."""
-LANDING_PITCH = 15.0 * DEGREE
+LANDING_PITCH = LANDING_BANK = 15.0 * DEGREE
 LANDING_NACELLE = 60.0 * DEGREE
 """Below this nacelle angle the proprotors (12.5 ft radius) would strike the ground."""
 LANDING_SPEED = 60.0 * KNOT
 LARGEST_PITCH = 80.0 * DEGREE
+LARGEST_BANK = 120.0 * DEGREE
+"""Ours: on its side it still flies; the model knows nothing of flight on the back."""
 _SPARE_S = 1.0
 """The rotors are back at full speed this long before the programme moves the nacelles [s]."""
 
@@ -58,10 +64,12 @@ def ask(flight: Flight) -> None:
     Args:
         flight: The flight as ``observe`` left it; its state does not change.
     """
-    state, command = flight.state, flight.scratch.command
+    tables, state, command = flight.tables, flight.state, flight.scratch.command
     pilot = command[STATION.pilot]
     if state.clock[CLOCK.mode] == MODE.mocm:
         call_at(flight.parts[PART.ask], flight)
+        if flight.parts[PART.ask_lateral] != 0 and lateral_awake(flight):
+            call_at(flight.parts[PART.ask_lateral], flight, tables.lateral_pilot)
     else:
         pilot[CHANNEL.stick] = state.u[INPUT.stick]
         pilot[CHANNEL.lever] = state.u[INPUT.lever]
@@ -70,6 +78,40 @@ def ask(flight: Flight) -> None:
         pilot[CHANNEL.pedal] = state.u[INPUT.pedal]
     for channel in range(CHANNEL.size):
         command[STATION.hands, channel] = pilot[channel]
+
+
+@inner_kernel
+def lateral_wakes(flight: Flight) -> bool:
+    """Whether the pilot's lateral half may have something to do in the frame that begins.
+
+    Args:
+        flight: The flight at the start of a frame.
+    """
+    tables, state = flight.tables, flight.state
+    if tables.plant.lateral == 0:
+        return False
+    return tables.lateral_noise != 0 or tables.lateral_asked != 0 or moves_sideways(state.x, state.u)
+
+
+@inner_kernel
+def lateral_awake(flight: Flight) -> bool:
+    """Whether the pilot's lateral half has anything to do: else it gives zero, as it would, without being asked.
+
+    Args:
+        flight: The flight as ``observe`` left it.
+    """
+    state, scratch = flight.state, flight.scratch
+    if flight.tables.lateral_noise != 0 or moves_sideways(state.x, state.u):
+        return True
+    wanted = scratch.wanted
+    if wanted[WANTED.turn_rate] != 0.0 or wanted[WANTED.turn_jerk] != 0.0 or wanted[WANTED.lateral_velocity] != 0.0:
+        return True
+    if wanted[WANTED.lateral_acceleration] != 0.0 or wanted[WANTED.heading] != state.x[STATE.heading]:
+        return True
+    awake = wanted[WANTED.turn_acceleration] != 0.0
+    for k in range(S_FILTERED + 1, state.lateral_pilot.shape[0]):
+        awake = awake or state.lateral_pilot[k] != 0.0
+    return awake
 
 
 @inner_kernel
@@ -252,14 +294,23 @@ def move_pilot(flight: Flight, normals: FloatArray) -> None:
         normals: Standard normals of the pilot's noise; none: no noise.
     """
     if flight.state.clock[CLOCK.mode] == MODE.mocm:
-        call_at(flight.parts[PART.advance], flight, normals)
+        tables, state = flight.tables, flight.state
+        own = tables.pilot.roles.displays + tables.pilot.roles.hands
+        noisy = normals.shape[0] > 0
+        call_at(flight.parts[PART.advance], flight, normals[:own] if noisy else normals)
+        if tables.plant.lateral != 0:
+            if flight.parts[PART.advance_lateral] != 0 and lateral_awake(flight):
+                rest = normals[own:] if noisy else normals
+                call_at(flight.parts[PART.advance_lateral], flight, tables.lateral_pilot, rest)
+            else:
+                state.lateral_pilot[S_FILTERED] = flight.scratch.shown[0]
     if flight.tables.automatic.active != 0:
         call_at(flight.parts[PART.automatic_advance], flight)
 
 
 @inner_kernel
 def move_plant(flight: Flight) -> None:
-    """Move flaps, rotor drive, aircraft, nacelles and the distance flown over the frame.
+    """Move flaps, rotor drive, aircraft, nacelles and the place over the ground over the frame.
 
     Args:
         flight: The flight with its command at all stations.
@@ -280,14 +331,46 @@ def move_plant(flight: Flight) -> None:
         for row in range(3):
             scratch.path[row, 0] = scratch.known[KNOWN.place]
     _turn_systems(flight)
+    heading = x[STATE.heading]  # not that of the row, to a whole turn: flights mirror to the last bit
     state.clock[CLOCK.flags] = call_at(
         flight.parts[PART.step], tables.plant.aircraft, x, u, scratch.path, dt, scratch.work
     )
     if failing:
         fault_actuators_end(scratch.planned, x)
-    after = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch])
-    state.clock[CLOCK.distance] += dt * (0.5 * (scratch.known[KNOWN.airspeed_in_air] + after) + tables.wind)
+    if tables.wind.reference_height != 0.0:
+        meet_wind(tables.wind, x, scratch.si[QUANTITY.altitude])
+    _move_place(flight, heading)
     nacelle_advance(tables.nacelle, state.nacelle, rate, dt)
+
+
+@inner_kernel
+def _move_place(flight: Flight, heading: float) -> None:
+    """Move the place over the ground and the distance flown, by the mean of the motion before and after the step.
+
+    Args:
+        flight: The flight after the step of its plant.
+        heading: Heading before it [rad].
+    """
+    tables, state, known = flight.tables, flight.state, flight.scratch.known
+    x, dt = state.x, tables.dt
+    through, sideways, _ = level_motion(x)
+    share = wind_share(tables.wind, x[STATE.altitude])
+    along, across = wind_along(tables.wind, x[STATE.heading])
+    wind, right = share * along, sideways + share * across
+    before_ahead, before_right = known[KNOWN.ground_ahead], known[KNOWN.ground_right]
+    if before_right == 0.0 and right == 0.0:
+        # Air and wind apart: so the distance of straight flights is what it has always been to the last bit.
+        mean = 0.5 * (known[KNOWN.airspeed_in_air] + through) + 0.5 * (known[KNOWN.wind] + wind)
+    else:
+        mean = 0.5 * (level_speed(before_ahead, before_right) + level_speed(through + wind, right))
+    state.clock[CLOCK.distance] += dt * mean
+    sine, cosine = math.sin(heading), math.cos(heading)
+    north, east = before_ahead * cosine - before_right * sine, before_ahead * sine + before_right * cosine
+    sine, cosine = math.sin(x[STATE.heading]), math.cos(x[STATE.heading])
+    north += (through + wind) * cosine - right * sine
+    east += (through + wind) * sine + right * cosine
+    x[STATE.north] += dt * 0.5 * north
+    x[STATE.east] += dt * 0.5 * east
 
 
 @inner_kernel
@@ -344,6 +427,10 @@ def move_reference(flight: Flight) -> None:
     )
     state.reference[REFERENCE.airspeed] = value
     state.reference[REFERENCE.rate] = value_rate
+    if tables.plant.lateral != 0:
+        known = scratch.known
+        asked = known[KNOWN.asked], known[KNOWN.asked + 1], known[KNOWN.asked + 2], known[KNOWN.asked + 3]
+        move_lateral_reference(state.reference, asked, state.x, known[KNOWN.wind_right], dt)
     state.clock[CLOCK.frame] += 1.0
 
 
@@ -398,16 +485,15 @@ def _end_code(flight: Flight) -> int:
     for i in range(x.shape[0]):
         if not math.isfinite(x[i]):
             return END.not_finite
-    pitch = x[STATE.pitch]
+    pitch, bank = x[STATE.pitch], x[STATE.bank]
     stands = tables.ground.active != 0.0
     if touches(tables.ground, x) if stands else x[STATE.altitude] < 0.0:
-        st, ct = math.sin(pitch), math.cos(pitch)
-        sink = x[STATE.w] * ct - x[STATE.u] * st
+        sink = -level_motion(x)[2]
         state.clock[CLOCK.sink] = sink
-        ground_speed = x[STATE.u] * ct + x[STATE.w] * st + tables.wind
-        upright = (
-            abs(pitch) <= LANDING_PITCH and state.nacelle[1] >= LANDING_NACELLE and abs(ground_speed) <= LANDING_SPEED
-        )
+        ahead, right = over_ground(tables.wind, x)
+        level = abs(pitch) <= LANDING_PITCH and abs(bank) <= LANDING_BANK
+        slow = abs(level_speed(ahead, right)) <= LANDING_SPEED
+        upright = level and slow and state.nacelle[1] >= LANDING_NACELLE
         if sink > (tables.ground.most_sink if stands else HARD_SINK_RATE) or not (upright or stands):
             return END.crash
         if not upright:
@@ -419,4 +505,6 @@ def _end_code(flight: Flight) -> int:
         return END.rotors_fast
     if not rotor_speed >= drive.lowest:
         return END.rotors_slow
+    if abs(bank) > LARGEST_BANK:
+        return END.bank
     return END.attitude if abs(pitch) > LARGEST_PITCH else END.none

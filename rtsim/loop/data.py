@@ -9,6 +9,7 @@ from rtsim.aids.lateral_aids_kernels import LateralAidTables
 from rtsim.aircraft.xv15.tables import Configuration, ControlTables
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.atmosphere.gust_kernels import GustTables
+from rtsim.atmosphere.wind_kernels import WindTables
 from rtsim.choices import PilotMode
 from rtsim.command import CHANNELS
 from rtsim.corridor.corridor_kernels import CorridorTables
@@ -30,19 +31,25 @@ MODES: dict[PilotMode, int] = MODE.asdict()  # type: ignore[assignment]  # the n
 """Pilot modes by name."""
 CLOCK = Places("frame", "mode", "distance", "flags", "end", "sink", "faults", "missing")
 """Frame number, who flies, distance flown [m], LPV flags, how the flight ended, sink rate at the end [m/s], whether a
-failure was thrown in, part that the
-coming frame needs and that is not compiled yet (1 + its place in ``PART``; 0 none)."""
-REFERENCE = Places("airspeed", "rate")
-"""The filtered airspeed reference [m/s] and its rate [m/s^2]."""
+failure was thrown in, part that the coming frame needs and that is not compiled yet (1 + its place in ``PART``; 0
+none)."""
+REFERENCE = Places(
+    "airspeed", "rate", "heading", "turn_rate", "turn_acceleration", "lateral", "lateral_rate", "on_track",
+    "line_north", "line_east", "line_course",
+)  # fmt: skip
+"""The filtered airspeed reference [m/s] and its rate [m/s^2]; heading [rad], turn rate [rad/s] and its rate; lateral
+velocity [m/s] and its rate; whether a line over the ground is held, one of its points [m] and its course [rad]."""
 END = Places(
-    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast", "aground"
+    "none", "crash", "attitude", "not_finite", "gentle_landing", "hard_landing", "rotors_slow", "rotors_fast",
+    "aground", "bank",
 )  # fmt: skip
 """Why a flight ended by itself."""
 END_REASONS = {
     END.none: "",
     END.crash: "the aircraft hit the ground, sinking at {sink:.1f} m/s",
-    END.aground: "came to grief on the ground: pitch beyond 15 deg, nacelles below 60 deg or faster than 60 kn",
+    END.aground: "came to grief on the ground: pitch or bank beyond 15 deg, nacelles below 60 deg or faster than 60 kn",
     END.attitude: "control was lost: pitch attitude beyond 80 deg",
+    END.bank: "control was lost: bank beyond 120 deg",
     END.not_finite: "the model diverged: a state is no longer a finite number",
     END.gentle_landing: "touched down gently, sinking at {sink:.1f} m/s",
     END.hard_landing: "landed hard, sinking at {sink:.1f} m/s",
@@ -50,13 +57,18 @@ END_REASONS = {
     END.rotors_fast: "rotor speed above 115 %: faster than can be flown",
 }
 """The same in words."""
-PROGRAMME = Places("time", "airspeed", "nacelle", "altitude")
+PROGRAMME = Places("time", "airspeed", "nacelle", "altitude", "turn_kind", "turn", "lateral", "track")
 """Rows of the programme."""
 MOTION = Places("angle", "rate", "acceleration")
 """The nacelles now [rad, rad/s, rad/s^2]."""
-KNOWN = Places("flap", "airspeed_ahead", "airspeed_in_air", "place")
+KNOWN = Places(
+    "flap", "airspeed_ahead", "airspeed_in_air", "place", "wind", "ground_ahead", "ground_right", "wind_right",
+    ("asked", 4),
+)  # fmt: skip
 """Flap deflection of the schedule [rad]; airspeed of the programme at the end of the frame, and of the aircraft at its
-start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]."""
+start, gusts excepted [m/s]; place on the nacelle axis of the database [rad]; wind along the heading, motion over the
+ground along it and to the right of it at the start of the frame [m/s]; wind to the right of it [m/s]; what turn and
+lateral speed the programme asks for."""
 STATION = Places("pilot", "hands", "aided", "protected", "acting")
 """Stations of the command on its way: what the pilot gave; what goes to the aids in its place, within the travel; with
 the aids; with the protection; what moves the controls."""
@@ -66,7 +78,7 @@ HELD = Places(*CHANNELS, ("reason", len(CHANNELS)))
 """What laws in Python hold until their next decision (NaN: the channel is the pilot's), and the limits behind it."""
 PART = Places(
     "outputs", "step", "ask", "advance", "decide", "aids", "air", "faults", "fail", "automatic_rate",
-    "automatic_advance", "script", "notice", "measure",
+    "automatic_advance", "script", "notice", "measure", "ask_lateral", "advance_lateral",
 )  # fmt: skip
 """Parts of the frame that are compiled on their own, by their places in ``Flight.parts``: plant (outputs, step), pilot
 (ask, advance), law (decide), pilot aids, gusts, failures (schedule, actuators), automatic nacelle, and what a
@@ -102,8 +114,8 @@ class SimulationTables(NamedTuple):
 
     dt: float
     """Length of a frame [s]."""
-    wind: float
-    """Tailwind [m/s]."""
+    wind: WindTables
+    """Steady wind."""
     plant: PlantTables
     """The aircraft."""
     nacelle: NacelleTables
@@ -114,6 +126,12 @@ class SimulationTables(NamedTuple):
     """Boundaries and levels."""
     pilot: PilotTables
     """The MOCM's gains and references."""
+    lateral_noise: int
+    """1: its lateral half is noisy."""
+    lateral_asked: int
+    """1: the programme asks for turns or sideward flight."""
+    lateral_pilot: Address
+    """Those of its lateral half: the parts ``ask_lateral`` and ``advance_lateral`` know them."""
     flaps: FlapTables
     """What moves the flaps."""
     drive: DriveTables
@@ -134,7 +152,8 @@ class SimulationTables(NamedTuple):
     protection: ProtectionTables
     """The compiled protection law; it acts after the aids, on what would move the controls."""
     programme: FloatArray
-    """Rows ``PROGRAMME``: time [s], airspeed [m/s], nacelle angle [rad], altitude [m] of the programme's points."""
+    """Rows ``PROGRAMME`` of the programme's points: time [s], airspeed [m/s], nacelle angle [rad], altitude [m], what
+    turning is asked for (``rtsim.programme.TURN``) and its value, lateral airspeed [m/s], whether a line is held."""
     script: ScriptTables
     """Scripted hands."""
     units: FloatArray
@@ -160,6 +179,8 @@ class SimulationState(NamedTuple):
     """Corridor level timers."""
     pilot: FloatArray
     """State of the MOCM."""
+    lateral_pilot: FloatArray
+    """State of its lateral half."""
     aids: FloatArray
     """State of the pilot aids."""
     switches: FloatArray
@@ -213,10 +234,12 @@ class Scratch(NamedTuple):
     """The command at its stations, shape (``STATION.size``, ``CHANNEL.size``)."""
     pilot: FloatArray
     """Work array of the pilot kernels."""
+    lateral_pilot: FloatArray
+    """That of its lateral half."""
+    wanted: FloatArray
+    """What the lateral half is asked for, ``WANTED``."""
     planned: FloatArray
     """Where failed actuators stand after the frame."""
-    gust: FloatArray
-    """Gust of the next frame in body axes."""
     sensors: FloatArray
     """What the protection law may know."""
     law: FloatArray

@@ -7,12 +7,13 @@ frame that the flight needs is compiled when it is first needed, before the fram
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rtsim.aircraft.variables import INPUT
+from rtsim.aircraft.variables import INPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.dryden_kernels import TURBULENCE
 from rtsim.atmosphere.gust_kernels import NORMALS_PER_FRAME
@@ -28,6 +29,7 @@ from rtsim.loop.data import (
     KNOWN,
     MOTION,
     PART,
+    REFERENCE,
     Flight,
     Scratch,
     SimulationState,
@@ -35,28 +37,58 @@ from rtsim.loop.data import (
 )
 from rtsim.loop.loading import entry_of, load_part, part_address
 from rtsim.pilot.engage_kernels import mocm_engage
-from rtsim.random_streams import STREAM_PILOT, STREAM_TURBULENCE, stream_generator
+from rtsim.pilot.lateral_kernels import lateral_engage
+from rtsim.pilot.layout_kernels import noise_width as noise_width_of
+from rtsim.random_streams import (
+    STREAM_LATERAL_PILOT,
+    STREAM_LATERAL_TURBULENCE,
+    STREAM_PILOT,
+    STREAM_TURBULENCE,
+    stream_generator,
+)
 
 WHOLE, COMPLETE = frames_of.WHOLE, frames_of.COMPLETE
 NO_ROWS = np.zeros(0)
 _NO_NORMALS = np.zeros((1, 0))
-_STILL = np.zeros((1, 3))
+_STILL = np.zeros((1, 2 * NORMALS_PER_FRAME))
 """Normals of the air where no time passes."""
 BLOCK = 2_048
 """Frames for which noise is drawn at a time in a flight that keeps no rows."""
-Streams = tuple[np.random.Generator, np.random.Generator]
-_ENGAGE = interpreted(mocm_engage)
+_ENGAGE, _ENGAGE_LATERAL = interpreted(mocm_engage), interpreted(lateral_engage)
 Measure = Callable[[Any], float]
 """A compiled part that looks at ``flight.scratch.row`` after each frame and adds to ``flight.measures``."""
 
 
+class Streams(NamedTuple):
+    """Random streams of a flight."""
+
+    pilot: np.random.Generator
+    """The pilot's noise."""
+    air: np.random.Generator
+    """Turbulence in the plane of symmetry."""
+    side: np.random.Generator
+    """Turbulence out of it."""
+    hands: np.random.Generator
+    """Noise of the pilot's lateral half."""
+
+
 def new_streams(seed: int) -> Streams:
-    """Random streams of the pilot's noise and of the turbulence.
+    """Random streams of a flight.
 
     Args:
         seed: Root of every random stream.
     """
-    return stream_generator(seed, STREAM_PILOT), stream_generator(seed, STREAM_TURBULENCE)
+    numbers = (STREAM_PILOT, STREAM_TURBULENCE, STREAM_LATERAL_TURBULENCE, STREAM_LATERAL_PILOT)
+    return Streams(*(stream_generator(seed, number) for number in numbers))
+
+
+def new_normals(streams: Streams) -> FloatArray:
+    """Standard normals for the first state of the turbulence, drawn as many whether or not they are needed.
+
+    Args:
+        streams: The flight's.
+    """
+    return np.concatenate([streams.air.standard_normal(3), streams.side.standard_normal(3)])
 
 
 class Flying:
@@ -82,7 +114,7 @@ class Flying:
             tables: What the frame reads.
             state: The state, changed by flying.
             scratch: Work space of this flight alone.
-            streams: Random streams of the pilot's noise and of the turbulence.
+            streams: Random streams.
             nonlinear: The nonlinear aircraft flies.
             noise_width: Standard normals that the pilot takes per frame; 0: no noise.
             measure: A part that measures each frame, and the array that it adds to.
@@ -95,7 +127,7 @@ class Flying:
         self.state: SimulationState = self.flight.state
         """Its state."""
         self.streams = streams
-        """Random streams of the pilot's noise and of the turbulence."""
+        """Random streams."""
         self.noise_width, self._nonlinear, self._gusts = noise_width, nonlinear, state.gusts
         self._load("outputs", "step")
         arguments = (self.flight, NO_ROWS, _NO_NORMALS, _NO_NORMALS, 0, 0)
@@ -150,9 +182,14 @@ class Flying:
         noise = air = _NO_NORMALS
         if stages & COMPLETE or frames > 1:
             if self.noise_width:
-                noise = self.streams[0].standard_normal((frames, self.noise_width))
+                noise = self.streams.pilot.standard_normal((frames, self.noise_width))
+                if self.tables.lateral_noise:
+                    width = interpreted(noise_width_of)(self.tables.lateral_pilot.target.mocm)
+                    noise = np.hstack([noise, self.streams.hands.standard_normal((frames, width))])
             if self._gusts.item(TURBULENCE.active):
-                air = self.streams[1].standard_normal((frames, NORMALS_PER_FRAME))
+                air = self.streams.air.standard_normal((frames, NORMALS_PER_FRAME))
+                if self._gusts.item(TURBULENCE.lateral):
+                    air = np.hstack([air, self.streams.side.standard_normal((frames, NORMALS_PER_FRAME))])
         flown = self._call(self.flight, rows, noise, air, frames, stages)
         if flown >= 0.0:
             return int(flown)
@@ -199,11 +236,21 @@ class Flying:
 
         Done in interpreted kernels: it happens once in a flight, and compiling it takes longer than a thousand times.
         """
-        self.do(frames_of.OBSERVE)
         tables, state, scratch = self.tables, self.state, self.scratch
+        if tables.plant.lateral:  # what it is asked for begins with how the aircraft moves, and leads on from there
+            x = state.x
+            turning = x[STATE.q] * math.sin(x[STATE.bank]) + x[STATE.r] * math.cos(x[STATE.bank])
+            state.reference[[REFERENCE.heading, REFERENCE.turn_rate]] = x[STATE.heading], turning
+            state.reference[[REFERENCE.turn_acceleration, REFERENCE.lateral_rate, REFERENCE.on_track]] = 0.0
+            state.reference[REFERENCE.lateral] = x[STATE.v]
+        self.do(frames_of.OBSERVE)
         present = np.array([state.u[INPUT.stick], state.u[INPUT.lever]])
         place, rate = float(scratch.known[KNOWN.place]), float(scratch.motion[MOTION.rate])
         _ENGAGE(tables.pilot, state.pilot, scratch.seen, place, rate, scratch.target, present)
+        if tables.plant.lateral:
+            hands = np.array([state.u[INPUT.lateral_stick], state.u[INPUT.pedal]])
+            pilot, airspeed = tables.lateral_pilot.target, float(scratch.shown[0])
+            _ENGAGE_LATERAL(pilot, state.lateral_pilot, state.x, place, airspeed, scratch.wanted, hands)
 
     def take(self, state: SimulationState) -> None:
         """Take another state.

@@ -30,6 +30,7 @@ from rtsim.loop.advance_kernels import (
     follow_script,
     hold,
     judge_end,
+    lateral_wakes,
     move_pilot,
     move_plant,
     move_reference,
@@ -97,6 +98,10 @@ def missing_part(flight: Flight) -> int:
         return 1 + PART.aids
     if tables.protection.law != LAW_OFF and parts[PART.decide] == 0:
         return 1 + PART.decide
+    if parts[PART.ask_lateral] == 0 and clock[CLOCK.mode] == MODE.mocm and lateral_wakes(flight):
+        return 1 + PART.ask_lateral
+    if parts[PART.ask_lateral] != 0 and parts[PART.advance_lateral] == 0:
+        return 1 + PART.advance_lateral
     if flight.state.gusts[GUST.busy] != 0.0 and parts[PART.air] == 0:
         return 1 + PART.air
     if faults_act(flight) and parts[PART.faults] == 0:

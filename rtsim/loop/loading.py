@@ -29,7 +29,11 @@ _PARTS: dict[str, Any] = {
     "script": parts.act_script,
     "notice": parts.notice_warning,
 }
-_MORE: dict[str, tuple[Any, ...]] = {"advance": (np.zeros(0),), "air": (0.0, np.zeros(0))}
+_LATERAL: dict[str, Any] = {"ask_lateral": parts.ask_lateral, "advance_lateral": parts.advance_lateral}
+"""Those of the pilot's lateral half, which also take its tables."""
+_MORE: dict[str, tuple[Any, ...]] = {
+    "advance": (np.zeros(0),), "advance_lateral": (np.zeros(0),), "air": (0.0, np.zeros(0)),
+}  # fmt: skip
 """Arguments that a part takes besides the flight."""
 
 
@@ -53,6 +57,8 @@ def load_part(flight: Flight, name: str, *, nonlinear: bool) -> None:
         # The monitor flies with most flights: it is compiled without what the other laws need.
         watches = flight.tables.protection.law == LAW_MONITOR
         kernel, arguments = (parts.watch_law if watches else parts.decide_law), (flight,)
+    elif name in _LATERAL:
+        kernel, arguments = _LATERAL[name], (flight, flight.tables.lateral_pilot.target, *_MORE.get(name, ()))
     else:
         kernel, arguments = _PARTS[name], (flight, *_MORE.get(name, ()))
     flight.parts[getattr(PART, name)] = part_address(kernel, *arguments)

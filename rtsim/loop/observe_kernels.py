@@ -8,6 +8,7 @@ from rtsim.aircraft.variables import INPUT, OUTPUT, STATE
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
+from rtsim.atmosphere.wind_kernels import level_motion, level_speed, wind_along, wind_gradient, wind_share
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import corridor_margins
 from rtsim.faults.fault_kernels import FAULT, fault_airspeed_error, fault_mask, fault_nacelle_ok
@@ -16,13 +17,19 @@ from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.parts import call_at
 from rtsim.loop.data import CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Flight
+from rtsim.loop.lateral_reference_kernels import fill_wanted, turn_wanted
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
+from rtsim.pilot.lateral_kernels import WANTED
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.systems.drive_kernels import DEVIATION, HELD_OFFSET, engine_power, rotor_speed_now, schedule_angle
 from rtsim.systems.engine_kernels import TANK, advance_ratio, fuel_flow, takeoff_power, thrust_over_solidity
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
 from rtsim.systems.ground_kernels import ground_contact, ground_effect
+from rtsim.units import GRAVITY
+
+STANDSTILL = 0.05
+"""Motion over the ground that has no course [m/s]."""
 
 
 @inner_kernel
@@ -80,6 +87,9 @@ def observe(flight: Flight) -> None:
     state.u[INPUT.gust_u] = gusts[GUST.u]
     state.u[INPUT.gust_w] = gusts[GUST.w]
     state.u[INPUT.gust_q] = gusts[GUST.q]
+    state.u[INPUT.gust_v] = gusts[GUST.v]
+    state.u[INPUT.gust_p] = gusts[GUST.p]
+    state.u[INPUT.gust_r] = gusts[GUST.r]
     speed = math.sqrt((x[STATE.u] + gusts[GUST.u]) ** 2 + (x[STATE.w] + gusts[GUST.w]) ** 2)
     flap_scheduled = nonlinear.flap_schedule(tables.plant.controls, speed, angle)
     scratch.known[KNOWN.flap] = flap_scheduled
@@ -89,17 +99,26 @@ def observe(flight: Flight) -> None:
     scratch.known[KNOWN.place] = place
     state.u[INPUT.rotor_speed] = drive[DEVIATION] + tables.drive.held_acts * drive[HELD_OFFSET]
     on_wheels = 0.0
+    through, sideways, climb = level_motion(x)
+    share = wind_share(tables.wind, x[STATE.altitude])
+    wind_ahead, wind_right = wind_along(tables.wind, x[STATE.heading])
+    ground_ahead, ground_right = through + share * wind_ahead, sideways + share * wind_right
+    scratch.known[KNOWN.airspeed_in_air] = through
+    scratch.known[KNOWN.wind] = share * wind_ahead
+    scratch.known[KNOWN.wind_right] = share * wind_right
+    scratch.known[KNOWN.ground_ahead], scratch.known[KNOWN.ground_right] = ground_ahead, ground_right
     if tables.ground.active != 0.0:
-        state.u[INPUT.ground_effect] = ground_effect(tables.ground, x[STATE.altitude], angle, speed)
-        on_wheels = ground_contact(tables.ground, x, tables.wind, state.u)
+        total = math.sqrt(speed**2 + (x[STATE.v] + gusts[GUST.v]) ** 2) if x[STATE.v] + gusts[GUST.v] != 0.0 else speed
+        state.u[INPUT.ground_effect] = ground_effect(tables.ground, x[STATE.altitude], angle, total)
+        on_wheels = ground_contact(tables.ground, x, (ground_ahead, ground_right), state.u)
     where = place if tables.drive.held_acts == 0.0 else angle
     aircraft = tables.plant.aircraft
+    # Left at zero by an aircraft that knows no motion out of its plane of symmetry.
+    scratch.y[OUTPUT.thrust_difference] = scratch.y[OUTPUT.torque_difference] = scratch.y[OUTPUT.side_force] = 0.0
     call_at(flight.parts[PART.outputs], aircraft, x, state.u, where, scratch.y, scratch.xdot, scratch.work)
+    scratch.y[OUTPUT.airspeed_rate] -= wind_gradient(tables.wind, x[STATE.altitude]) * climb * wind_ahead
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
-    through = x[STATE.u] * ct + x[STATE.w] * st
-    scratch.known[KNOWN.airspeed_in_air] = through
     airspeed = through + gusts[GUST.ahead]
-    climb = x[STATE.u] * st - x[STATE.w] * ct
     corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
     _see(flight, airspeed)
     y = scratch.y
@@ -120,10 +139,10 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.nacelle_rate] = rate
     si[QUANTITY.altitude_reference] = scratch.target[TARGET.altitude]
     si[QUANTITY.airspeed_rate] = y[OUTPUT.airspeed_rate]
-    si[QUANTITY.ground_speed] = through + tables.wind
+    si[QUANTITY.ground_speed] = level_speed(ground_ahead, ground_right)
     si[QUANTITY.climb_rate] = climb
     si[QUANTITY.distance] = state.clock[CLOCK.distance]
-    si[QUANTITY.flight_path] = math.atan2(climb, max(abs(through), 1.0))
+    si[QUANTITY.flight_path] = math.atan2(climb, max(abs(level_speed(through, sideways)), 1.0))
     ahead, below = x[STATE.u] + gusts[GUST.u], x[STATE.w] + gusts[GUST.w]
     si[QUANTITY.angle_of_attack] = scheduling_alpha(ahead, below, st, ct, tables.plant.alpha_speed)
     si[QUANTITY.pitch_rate] = x[STATE.q]
@@ -160,6 +179,64 @@ def observe(flight: Flight) -> None:
     si[QUANTITY.advance_ratio] = advance_ratio(tables.engine, across, rotor_speed)
     si[QUANTITY.thrust_coefficient_over_solidity] = thrust_over_solidity(tables.engine, y[OUTPUT.thrust], rotor_speed)
     _reckon_engines(flight, engine_power(state.drive, power))
+    _note_lateral(flight, sideways)
+
+
+@inner_kernel
+def _wrapped(angle: float) -> float:
+    """An angle between 0 and 2 pi."""
+    turn = 2.0 * math.pi
+    angle %= turn
+    return angle if angle < turn else 0.0
+
+
+@inner_kernel
+def _note_lateral(flight: Flight, sideways: float) -> None:
+    """Fill the quantities of the motion out of the plane of symmetry, and where the aircraft is.
+
+    Args:
+        sideways: Sideways airspeed, gusts excepted [m/s].
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    x, y, si, gusts, known = state.x, scratch.y, scratch.si, state.gusts, scratch.known
+    heading, bank = x[STATE.heading], x[STATE.bank]
+    si[QUANTITY.bank] = bank
+    si[QUANTITY.heading] = _wrapped(heading)
+    si[QUANTITY.roll_rate] = x[STATE.p]
+    si[QUANTITY.yaw_rate] = x[STATE.r]
+    turning = x[STATE.q] * math.sin(bank) + x[STATE.r] * math.cos(bank)
+    si[QUANTITY.turn_rate] = turning / math.cos(x[STATE.pitch]) + 0.0
+    u, v, w = x[STATE.u] + gusts[GUST.u], x[STATE.v] + gusts[GUST.v], x[STATE.w] + gusts[GUST.w]
+    si[QUANTITY.sideslip] = math.atan2(v, math.sqrt(u * u + w * w + tables.plant.alpha_speed**2))
+    si[QUANTITY.lateral] = sideways + gusts[GUST.right]
+    si[QUANTITY.lateral_acceleration] = y[OUTPUT.side_force]
+    si[QUANTITY.north], si[QUANTITY.east] = x[STATE.north], x[STATE.east]
+    ahead, right = known[KNOWN.ground_ahead], known[KNOWN.ground_right]
+    moves = abs(ahead) > STANDSTILL or abs(right) > STANDSTILL
+    si[QUANTITY.track] = _wrapped(heading + math.atan2(right, ahead)) if moves else si[QUANTITY.heading]
+    si[QUANTITY.flapping_right] = _flapping(x, 1.0)
+    si[QUANTITY.flapping_left] = _flapping(x, -1.0)
+    si[QUANTITY.mast_torque_right] = y[OUTPUT.torque] + y[OUTPUT.torque_difference]
+    si[QUANTITY.mast_torque_left] = y[OUTPUT.torque] - y[OUTPUT.torque_difference]
+    si[QUANTITY.aileron] = x[STATE.aileron]
+    si[QUANTITY.rudder] = x[STATE.rudder]
+    si[QUANTITY.differential_collective] = x[STATE.collective_difference]
+    si[QUANTITY.differential_cyclic] = x[STATE.cyclic_difference]
+    si[QUANTITY.gust_v] = gusts[GUST.v]
+    si[QUANTITY.gust_p] = gusts[GUST.p]
+    si[QUANTITY.gust_r] = gusts[GUST.r]
+    share = wind_share(tables.wind, x[STATE.altitude])
+    towards_north, towards_east = wind_along(tables.wind, 0.0)
+    si[QUANTITY.wind_north] = share * towards_north
+    si[QUANTITY.wind_east] = share * towards_east
+
+
+@inner_kernel
+def _flapping(x: FloatArray, side: float) -> float:
+    """Magnitude of one rotor's flapping: 1 right, -1 left [rad]."""
+    along = x[STATE.flap_1c] + side * x[STATE.flap_1c_difference]
+    across = x[STATE.flap_1s] + side * x[STATE.flap_1s_difference]
+    return math.sqrt(along**2 + across**2)
 
 
 @inner_kernel
@@ -199,13 +276,28 @@ def _ask(flight: Flight, time: float) -> None:
     if tables.automatic.active != 0:
         wanted_rate = call_at(flight.parts[PART.automatic_rate], flight)
     target[TARGET.nacelle_rate] = nacelle_assigned_rate(tables.nacelle, wanted_rate)
+    if tables.plant.lateral != 0:
+        _ask_sideways(flight, now, now_share)
+
+
+@inner_kernel
+def _ask_sideways(flight: Flight, low: int, share: float) -> None:
+    """Fill what the pilot's lateral half is asked for, and the load factor of the turn for the other half."""
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    asked = turn_wanted(tables.programme, low, share)
+    for k in range(len(asked)):
+        scratch.known[KNOWN.asked + k] = asked[k]
+    fill_wanted(state.reference, asked, state.x, scratch.known[KNOWN.wind_right], scratch.wanted)
+    slope = max(scratch.wanted[WANTED.airspeed], 0.0) * scratch.wanted[WANTED.turn_rate] / GRAVITY
+    scratch.target[TARGET.turn_excess] = math.sqrt(1.0 + slope * slope) - 1.0
 
 
 @inner_kernel
 def _see(flight: Flight, airspeed: float) -> None:
     """Fill what pilots and laws are shown: indicated airspeed, its margins, and the state shifted to agree with it.
 
-    The shift is along the horizon, so that the climb rate computed from the seen state stays the true one.
+    The shift, gusts from ahead and from the side among it, is along the horizon, so that the climb rate computed from
+    the seen state stays the true one.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     x, seen, shown = state.x, scratch.seen, scratch.shown
@@ -219,9 +311,19 @@ def _see(flight: Flight, airspeed: float) -> None:
     for k in range(x.shape[0]):
         seen[k] = x[k]
     shift = state.gusts[GUST.ahead] + error
-    if shift != 0.0:
+    right = state.gusts[GUST.right]
+    if shift != 0.0 or right != 0.0:
+        upright = shift * math.sin(x[STATE.pitch])
+        sine, cosine = math.sin(x[STATE.bank]), math.cos(x[STATE.bank])
         seen[STATE.u] += shift * math.cos(x[STATE.pitch])
-        seen[STATE.w] += shift * math.sin(x[STATE.pitch])
+        seen[STATE.v] += upright * sine + right * cosine
+        seen[STATE.w] += upright * cosine - right * sine
+    if x[STATE.bank] != 0.0:
+        # Airspeed and climb are read in the vertical plane, whatever the bank; of the pitch rate what the turn that is
+        # asked for does not need.
+        sine, cosine = math.sin(x[STATE.bank]), math.cos(x[STATE.bank])
+        seen[STATE.w] = seen[STATE.v] * sine + seen[STATE.w] * cosine
+        seen[STATE.q] = x[STATE.q] - state.reference[REFERENCE.turn_rate] * math.cos(x[STATE.pitch]) * sine
 
 
 @inner_kernel
@@ -247,3 +349,16 @@ def sense(flight: Flight) -> None:
     sensors[SENSOR.flapping] = si[QUANTITY.flapping]
     sensors[SENSOR.on_downstop] = si[QUANTITY.on_downstop]
     sensors[SENSOR.nacelle_ok] = 1.0 if fault_nacelle_ok(flight.state.faults) else 0.0
+    sensors[SENSOR.bank] = si[QUANTITY.bank]
+    sensors[SENSOR.roll_rate] = si[QUANTITY.roll_rate]
+    sensors[SENSOR.yaw_rate] = si[QUANTITY.yaw_rate]
+    sensors[SENSOR.heading] = si[QUANTITY.heading]
+    sensors[SENSOR.sideslip] = si[QUANTITY.sideslip]
+    sensors[SENSOR.lateral_velocity] = si[QUANTITY.lateral]
+    sensors[SENSOR.lateral_acceleration] = si[QUANTITY.lateral_acceleration]
+    sensors[SENSOR.north] = si[QUANTITY.north]
+    sensors[SENSOR.east] = si[QUANTITY.east]
+    sensors[SENSOR.flapping_left] = si[QUANTITY.flapping_left]
+    sensors[SENSOR.flapping_right] = si[QUANTITY.flapping_right]
+    sensors[SENSOR.mast_torque_left] = si[QUANTITY.mast_torque_left]
+    sensors[SENSOR.mast_torque_right] = si[QUANTITY.mast_torque_right]

@@ -17,10 +17,14 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from rtsim.aircraft.condition import SHIPPED, AircraftCondition, AircraftName
 from rtsim.choices import BUILT_IN_PILOT, HAND_PILOT, PASSIVE_LAWS, AidName, CorridorName, OuterLoop, PlantName
 from rtsim.errors import InputError, suggestion
-from rtsim.units import FOOT, INCH, KNOT, POUND, POUND_FORCE, RPM
+from rtsim.units import DEGREE, FOOT, INCH, KNOT, POUND, POUND_FORCE, RPM
 
 FULL_ROTOR_SPEED = 0.0
 """Rotor speed of a flight that is asked for none: the aircraft's own in conversion [rad/s]."""
+FROM_BEHIND = -DEGREE
+"""Direction of a wind that is given none: it blows along the heading at the start [rad]."""
+EVERY_HEIGHT = 0.0
+"""Reference height of a wind that is the same at every height [m]."""
 FULL_TANKS = 1490.0 * POUND_FORCE
 """Fuel of a flight that is asked for none: the XV-15's full tanks, and another aircraft's own [N]."""
 CONDITION = ("mass", "density_altitude", "cg_forward")
@@ -296,6 +300,16 @@ class FlightOptions:
         default_words="that of the conversion, 589",
         page="systems.md",
     )
+    heading: float = option(
+        0.0,
+        help="Heading at the start, clockwise from north.",
+        panel="Start",
+        key="heading_deg",
+        unit="deg",
+        factor=DEGREE,
+        low=0.0,
+        high=360.0,
+    )
     ground: bool = option(
         False,
         help="Put a flat ground under the wheels, with ground effect: land, stand, take off; else touching it ends the"
@@ -317,13 +331,36 @@ class FlightOptions:
     )
     wind: float = option(
         0.0,
-        help="Steady tailwind; negative is a headwind.",
+        help="Steady wind: a tailwind, negative a headwind; with a direction, the wind from there.",
         panel="Air",
         key="wind_kt",
         unit="kn",
         factor=KNOT,
         low=-40.0,
         high=40.0,
+        page="atmosphere.md",
+    )
+    wind_from: float = option(
+        FROM_BEHIND,
+        help="Where the wind comes from, clockwise from north.",
+        panel="Air",
+        key="wind_from_deg",
+        unit="deg",
+        factor=DEGREE,
+        low=0.0,
+        high=360.0,
+        default_words="from behind at the start",
+        page="atmosphere.md",
+    )
+    wind_reference_height: float = option(
+        EVERY_HEIGHT,
+        help="Height at which the wind blows as given; with one, it is less below and more above.",
+        panel="Air",
+        key="wind_reference_height_m",
+        unit="m",
+        low=1.0,
+        high=300.0,
+        default_words="the same wind at every height",
         page="atmosphere.md",
     )
     pilot_noise: bool = option(

@@ -10,11 +10,13 @@ from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST, gust_step
+from rtsim.atmosphere.wind_kernels import level_motion
 from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
 from rtsim.loop.data import CHANNEL, CLOCK, KNOWN, MOTION, STATION, Flight
 from rtsim.nacelle.automatic_kernels import automatic_advance, automatic_rate
+from rtsim.pilot.lateral_kernels import LateralPilotTables, lateral_advance_in, lateral_output_in
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import mocm_advance_in, mocm_output_in
 from rtsim.protection.law_data import LAW
@@ -35,7 +37,7 @@ def ask_mocm(flight: Flight) -> float:
     angle = scratch.known[KNOWN.place]
     mocm_output_in(flight.tables.pilot, flight.state.pilot, angle, scratch.target, command, scratch.pilot)
     command[CHANNEL.nacelle_rate] = scratch.target[TARGET.nacelle_rate]
-    # The MOCM's lateral half: none yet, so stick and pedals are let go.
+    # Its lateral half gives these, where the aircraft rolls and anything does.
     command[CHANNEL.lateral_stick] = command[CHANNEL.pedal] = 0.0
     return 0.0
 
@@ -52,6 +54,40 @@ def advance_mocm(flight: Flight, normals: FloatArray) -> float:
     scalars = (scratch.known[KNOWN.place], scratch.motion[MOTION.rate], tables.dt)
     acting = scratch.command[STATION.protected]
     mocm_advance_in(tables.pilot, state.pilot, scratch.seen, scalars, scratch.target, acting, normals, scratch.pilot)
+    return 0.0
+
+
+@part
+def ask_lateral(flight: Flight, pilot: LateralPilotTables) -> float:
+    """Lateral stick and pedals of the MOCM as the station ``pilot``; changes no state.
+
+    Args:
+        flight: The flight as ``observe`` left it.
+        pilot: Its lateral half.
+    """
+    scratch = flight.scratch
+    hands = scratch.command[STATION.pilot, CHANNEL.lateral_stick : CHANNEL.pedal + 1]
+    angle, pitch = scratch.known[KNOWN.place], flight.state.x[STATE.pitch]
+    lateral_output_in(pilot, flight.state.lateral_pilot, scratch.wanted, angle, pitch, hands, scratch.lateral_pilot)
+    return 0.0
+
+
+@part
+def advance_lateral(flight: Flight, pilot: LateralPilotTables, normals: FloatArray) -> float:
+    """Move the MOCM's lateral half to the next frame.
+
+    Args:
+        flight: The flight with its command at all stations.
+        pilot: Its lateral half.
+        normals: Standard normals of its noise; none: no noise.
+    """
+    tables, state, scratch = flight.tables, flight.state, flight.scratch
+    seen = scratch.seen
+    gust = seen[STATE.v] - state.x[STATE.v]
+    scalars = (scratch.known[KNOWN.place], scratch.shown[0], gust, tables.dt)
+    acting = scratch.command[STATION.protected, CHANNEL.lateral_stick : CHANNEL.pedal + 1]
+    work = scratch.lateral_pilot
+    lateral_advance_in(pilot, state.lateral_pilot, state.x, scalars, scratch.wanted, acting, normals, work)
     return 0.0
 
 
@@ -95,6 +131,9 @@ def act_aids(flight: Flight) -> float:
     expected = flap_schedule(tables.plant.controls, airspeed, angle)
     flap_parts(tables.flaps, flap_now(state.flaps, scratch.known[KNOWN.flap]), expected, scratch.flaps)
     place = scratch.known[KNOWN.place]
+    x, bank = state.x, state.x[STATE.bank]
+    if bank != 0.0:  # the pitch rate that belongs to the turn is none to be damped
+        scratch.seen[STATE.q] = x[STATE.q] - x[STATE.r] * math.sin(bank) / max(math.cos(bank), 0.5)
     lateral_aids_step(
         tables.lateral_aids, state.aids, state.switches, scratch.seen, place, airspeed, hands, aided, tables.dt
     )
@@ -114,11 +153,9 @@ def move_air(flight: Flight, elapsed: float, normals: FloatArray) -> float:
     """
     tables, state, x = flight.tables, flight.state, flight.state.x
     time = state.clock[CLOCK.frame] * tables.dt
-    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2)
-    altitude, pitch = x[STATE.altitude], x[STATE.pitch]
-    gust_step(
-        tables.gusts, state.gusts, speed, altitude, pitch, time, elapsed, normals, flight.scratch.gust
-    )  # fmt: skip
+    speed = math.sqrt(x[STATE.u] ** 2 + x[STATE.w] ** 2 + x[STATE.v] ** 2)
+    attitude = (x[STATE.pitch], x[STATE.bank])
+    gust_step(tables.gusts, state.gusts, speed, x[STATE.altitude], attitude, time, elapsed, normals)
     return 0.0
 
 
@@ -131,7 +168,7 @@ def schedule_faults(flight: Flight) -> float:
     """
     tables, state, x = flight.tables, flight.state, flight.state.x
     time = state.clock[CLOCK.frame] * tables.dt
-    airspeed = x[STATE.u] * math.cos(x[STATE.pitch]) + x[STATE.w] * math.sin(x[STATE.pitch]) + state.gusts[GUST.ahead]
+    airspeed = level_motion(x)[0] + state.gusts[GUST.ahead]
     fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
     return 0.0
 

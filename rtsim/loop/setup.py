@@ -29,7 +29,7 @@ from rtsim.aircraft.variables import (
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear_kernels
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.arrays import FloatArray
-from rtsim.atmosphere.air import gust_tables, new_gust_state
+from rtsim.atmosphere.air import gust_tables, new_gust_state, wind_tables
 from rtsim.atmosphere.specification import CALM, AirSpecification
 from rtsim.choices import CorridorName, PlantName, SwitchName
 from rtsim.command import SENSOR
@@ -50,6 +50,7 @@ from rtsim.loop.data import (
     KNOWN,
     MODES,
     MOTION,
+    REFERENCE,
     STATION,
     PlantTables,
     Scratch,
@@ -57,7 +58,7 @@ from rtsim.loop.data import (
     SimulationState,
     SimulationTables,
 )
-from rtsim.loop.flying import Flying, Measure, new_streams
+from rtsim.loop.flying import Flying, Measure, new_normals, new_streams
 from rtsim.loop.options import FULL_ROTOR_SPEED, FULL_TANKS, FlightOptions, declared
 from rtsim.loop.script import Pulse, pulse_table
 from rtsim.loop.script_kernels import new_script_state
@@ -73,10 +74,12 @@ from rtsim.nacelle.automatic import AutomaticNacelle, inactive_tables
 from rtsim.nacelle.automatic_kernels import AUTOMATIC_STATE_SIZE
 from rtsim.nacelle.nacelle_kernels import new_actuator_state
 from rtsim.nacelle.switch import load_nacelle_tables
+from rtsim.pilot.lateral_kernels import WANTED, lateral_work_size
+from rtsim.pilot.lateral_tables import load_lateral_pilot
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.pilot.pilot_kernels import pilot_work_size
 from rtsim.pilot.tables import load_pilot_tables, noise_width, pilot_state_size
-from rtsim.programme import Programme, ProgrammePoint
+from rtsim.programme import LATERAL_ROWS, Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.chain import compiled_law
 from rtsim.protection.law_data import LAW, WORK_SIZE, ProtectionTables
@@ -233,30 +236,39 @@ def build_parts(setup: FlightSetup) -> Parts:
         if not nonlinear and not meets_ground(loaded):
             raise needed_inputs_error("ground", "on", "false", GROUND_INPUTS)
         altitude = max(altitude, light_on_wheels(ground, float(x[STATE.pitch])))
-    x[STATE.altitude] = altitude
+    x[STATE.altitude], x[STATE.heading] = altitude, options.heading
     programme = setup.programme
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
     pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
     lpv = None if nonlinear else _lpv_tables(database, options.plant)
-    lateral = 1 if nonlinear or hasattr(lpv, "symmetric") else 0
-    lateral_aids = bool(lateral) and knows_lateral_aids(database)
+    rolls = nonlinear or hasattr(lpv, "symmetric")
+    lateral_aids = rolls and knows_lateral_aids(database)
     for name in LATERAL_AIDS.intersection(options.aids):
         if not lateral_aids:
             raise lateral_aid_error(name)
     tables = SimulationTables(
         dt=dt,
-        wind=float(options.wind),
+        wind=wind_tables(
+            options.wind,
+            None if options.wind_from < 0.0 else options.wind_from,
+            heading=options.heading,
+            reference_height=options.wind_reference_height,
+            felt=rolls,
+        ),
         plant=PlantTables(
             aircraft=Address(own if nonlinear else lpv),
             configuration=own.configuration,
             controls=control_tables(profile),
             alpha_speed=scheduling_speed(database),
-            lateral=lateral,
+            lateral=int(rolls),
         ),
         nacelle=load_nacelle_tables(profile),
         automatic=inactive_tables() if setup.automatic_nacelle is None else setup.automatic_nacelle.tables(profile),
         corridor=_corridor_tables(corridor, database),
         pilot=pilot,
+        lateral_noise=int(rolls and options.pilot_noise),
+        lateral_asked=int(not programme.symmetric),
+        lateral_pilot=Address(load_lateral_pilot(database, dt=dt) if rolls else pilot),
         flaps=load_flap_tables(profile),
         drive=drive,
         ground=ground,
@@ -267,7 +279,15 @@ def build_parts(setup: FlightSetup) -> Parts:
         faults=fault_tables(setup.faults, profile),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
         protection=_law(compiled_law(load_laws(options.protection)) or "monitor", corridor, database, dt),
-        programme=np.array([programme.time, programme.airspeed, programme.nacelle_angle, programme.altitude]),
+        programme=np.array(
+            [
+                programme.time,
+                programme.airspeed,
+                programme.nacelle_angle,
+                programme.altitude,
+                *(getattr(programme, name) for name in LATERAL_ROWS),
+            ]
+        ),
         script=ScriptTables(pulse_table(setup.pulses), -1.0 if setup.reaction is None else setup.reaction),
         units=UNIT_SCALES,
         reference_frequency=REFERENCE_FREQUENCY,
@@ -321,13 +341,22 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         target=np.zeros(TARGET.size),
         command=np.zeros((STATION.size, CHANNEL.size)),
         pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
+        lateral_pilot=np.zeros(_lateral_sizes(tables)[1]),
+        wanted=np.zeros(WANTED.size),
         planned=np.zeros(3),
-        gust=np.zeros(3),
         sensors=np.zeros(SENSOR.size),
         law=np.zeros(WORK_SIZE),
         si=np.zeros(SIGNAL_COUNT),
         row=np.zeros(SIGNAL_COUNT),
     )
+
+
+def _lateral_sizes(tables: SimulationTables) -> tuple[int, int]:
+    """Lengths of state and work array of the pilot's lateral half."""
+    if tables.plant.lateral == 0:
+        return 1, 1
+    pilot = tables.lateral_pilot.target
+    return interpreted(pilot_state_size)(pilot.mocm), interpreted(lateral_work_size)(pilot)
 
 
 def _needed_aids(setup: FlightSetup, database: Database) -> tuple[SwitchName, ...]:
@@ -391,7 +420,7 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     Args:
         setup: The flight.
         parts: Its parts.
-        air_normals: Three standard normals: the turbulence at the start.
+        air_normals: Six standard normals: the turbulence at the start.
     """
     options = setup.options
     airspeed, nacelle, _ = _start(setup)
@@ -406,9 +435,10 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
         u=u,
         nacelle=new_actuator_state(nacelle),
         automatic=np.zeros(AUTOMATIC_STATE_SIZE),
-        reference=np.array([airspeed, 0.0]),
+        reference=_start_reference(airspeed, options.heading),
         level=new_level_state(),
         pilot=np.zeros(interpreted(pilot_state_size)(parts.tables.pilot)),
+        lateral_pilot=np.zeros(_lateral_sizes(parts.tables)[0]),
         aids=np.zeros(MEMORY.size),
         switches=switches_of(options.aids),
         flaps=np.zeros(FLAP_STATE_SIZE),
@@ -430,6 +460,12 @@ def start_state(setup: FlightSetup, parts: Parts, air_normals: FloatArray) -> Si
     if options.aids:
         state.aids[MEMORY.last_switches] = -1.0  # engaged in the first frame, from the trim
     return state
+
+
+def _start_reference(airspeed: float, heading: float) -> FloatArray:
+    reference = np.zeros(REFERENCE.size)
+    reference[REFERENCE.airspeed], reference[REFERENCE.heading] = airspeed, heading
+    return reference
 
 
 def _tank(fuel: float, capacity: float) -> FloatArray:
@@ -468,7 +504,7 @@ def prepare(
     streams = new_streams(setup.options.seed)
     flying = Flying(
         parts.tables,
-        start_state(setup, parts, streams[1].standard_normal(3)),
+        start_state(setup, parts, new_normals(streams)),
         new_scratch(parts.tables),
         streams=streams,
         nonlinear=parts.nonlinear,
@@ -490,7 +526,7 @@ def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
         parts: Its parts.
     """
     flying.streams = new_streams(setup.options.seed)
-    flying.take(start_state(setup, parts, flying.streams[1].standard_normal(3)))
+    flying.take(start_state(setup, parts, new_normals(flying.streams)))
     flying.do(frames_of.DISTURB)
     flying.engage()
 

@@ -18,7 +18,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.air import add_gust, set_turbulence
 from rtsim.atmosphere.specification import Gust, Turbulence
 from rtsim.choices import PilotMode, SwitchName
-from rtsim.command import Command, Margins, Reference, Sensors
+from rtsim.command import SENSOR, Command, Margins, Reference, Sensors
 from rtsim.errors import InputError, suggestion
 from rtsim.faults.fault import Fault, FaultSwitch
 from rtsim.faults.fault_kernels import fault_apply
@@ -26,7 +26,7 @@ from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT
 from rtsim.kernels.compiled import interpreted
 from rtsim.loop.data import CLOCK, END, END_REASONS, KNOWN, MODES, STATION, SimulationState, SimulationTables
-from rtsim.loop.flying import WHOLE, Flying
+from rtsim.loop.flying import WHOLE, Flying, new_normals
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
 from rtsim.loop.setup import (
     FlightSetup,
@@ -179,6 +179,7 @@ class Simulation:
             nacelle_angle=wanted.nacelle_angle,
             nacelle_rate=float(target[TARGET.nacelle_rate]),
             altitude=float(target[TARGET.altitude]),
+            heading=self.setup.options.heading,
         )
 
     def margins(self) -> Margins:
@@ -391,7 +392,7 @@ class Simulation:
         Args:
             turbulence: What it becomes; its ``fade_in`` is the time of the change.
         """
-        set_turbulence(self._state.gusts, turbulence, self.flying.streams[1].standard_normal(3))
+        set_turbulence(self._state.gusts, turbulence, new_normals(self.flying.streams))
 
     def set_protection_override(self, on: bool) -> None:
         """Take the authority from the protection, or give it back, from this frame on; it goes on watching.
@@ -408,8 +409,7 @@ class Simulation:
 
     def snapshot(self) -> Snapshot:
         """Copy all state: aircraft, actuators, filters, pilot, levels, clock and random stream."""
-        pilot, air = self.flying.streams
-        noise_state = {"generator": pilot.bit_generator.state, "air": air.bit_generator.state}
+        noise_state = {name: one.bit_generator.state for name, one in self.flying.streams._asdict().items()}
         laws = self.laws.snapshot() if self.laws is not None else None
         return Snapshot(SimulationState(*(array.copy() for array in self._state)), noise_state, laws)
 
@@ -421,9 +421,8 @@ class Simulation:
         """
         instance(snapshot, Snapshot, "snapshot", "give what snapshot() returned")
         self.flying.take(snapshot.state)
-        pilot, air = self.flying.streams
-        pilot.bit_generator.state = snapshot.random_stream["generator"]
-        air.bit_generator.state = snapshot.random_stream["air"]
+        for name, one in self.flying.streams._asdict().items():
+            one.bit_generator.state = snapshot.random_stream[name]
         if self.laws is not None and snapshot.laws is not None:
             self.laws.restore(snapshot.laws)
         self._observed = False
@@ -441,7 +440,8 @@ def sensors_of(values: FloatArray) -> Sensors:
         values: In the order of ``Sensors``, shape (SENSOR.size,), booleans as numbers.
     """
     numbers: list[Any] = values.tolist()
-    numbers[-2:] = (numbers[-2] != 0.0, numbers[-1] != 0.0)  # the last two are booleans
+    for place in (SENSOR.on_downstop, SENSOR.nacelle_ok):
+        numbers[place] = numbers[place] != 0.0
     return Sensors(*numbers)
 
 

@@ -213,25 +213,29 @@ class LpvAircraft:
         """
         self._require_inside(airspeed, nacelle)
         d, level = self.database, self.database.level_layer
-        A, B, C, D = (self._interpolate(array[level], airspeed, nacelle) for array in (d.A, d.B, d.C, d.D))
+        A, B, C, D = (self.interpolated(array[level], airspeed, nacelle) for array in (d.A, d.B, d.C, d.D))
         return A, B, C, D
 
     def flap(self, *, airspeed: float, nacelle: float) -> float:
         """Flap deflection of the schedule, interpolated between the grid points [rad]."""
-        return float(self._interpolate(self.database.flap, airspeed, nacelle))
+        return float(self.interpolated(self.database.flap, airspeed, nacelle))
 
     def is_valid(self, *, airspeed: float, nacelle: float) -> bool:
         """Whether all grid points around a condition have a level trim."""
         d = self.database
         if not (d.airspeed[0] <= airspeed <= d.airspeed[-1] and d.nacelle[0] <= nacelle <= d.nacelle[-1]):
             return False
-        return bool(self._interpolate(d.valid[d.level_layer].astype(float), airspeed, nacelle) > 1.0 - 1e-9)
+        return bool(self.interpolated(d.valid[d.level_layer].astype(float), airspeed, nacelle) > 1.0 - 1e-9)
 
     def _altitude(self) -> int:
         return position(self.database.states, "altitude")
 
-    def _interpolate(self, array: FloatArray, airspeed: float, nacelle: float) -> FloatArray:
-        """Bilinear interpolation of an array with leading axes [airspeed, nacelle]."""
+    def interpolated(self, array: FloatArray, airspeed: float, nacelle: float) -> FloatArray:
+        """Interpolate an array on the database's grid.
+
+        Args:
+            array: Leading axes [airspeed, nacelle].
+        """
         d = self.database
         (i, s), (j, t) = _cell(d.airspeed, airspeed), _cell(d.nacelle, nacelle)
         near = (1.0 - t) * array[i, j] + t * array[i, j + 1]
@@ -250,8 +254,8 @@ class LpvAircraft:
             layer, share = _cell(d.layer_acceleration, acceleration)
         parts = []
         for array in (d.x_ref, d.u_ref):
-            near = self._interpolate(array[layer], airspeed, nacelle)
-            far = near if share == 0.0 else self._interpolate(array[layer + 1], airspeed, nacelle)
+            near = self.interpolated(array[layer], airspeed, nacelle)
+            far = near if share == 0.0 else self.interpolated(array[layer + 1], airspeed, nacelle)
             parts.append((1.0 - share) * near + share * far)
         return parts[0], parts[1], free
 

@@ -45,6 +45,11 @@ def flown_database(database: Database, file: str | None = None) -> Database:
     pairs = ((database.states, STATES), (database.inputs, INPUTS), (database.outputs, OUTPUTS))
     if all([v.name for v in have] == [v.name for v in want] for have, want in pairs):
         return database
+    if database.lateral is not None:
+        raise InputError(
+            "its variables are not in the order of the closed loop, which one with a lateral half must keep",
+            file=file, key="states, inputs, outputs", mend="write it as the shipped one is (rtsim model export)",
+        )  # fmt: skip
     x, u, y = (np.array([position(have, variable.name) for variable in want]) for have, want in pairs)
 
     def pick(name: str, *places: Any) -> FloatArray:

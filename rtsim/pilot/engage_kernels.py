@@ -20,6 +20,7 @@ from rtsim.pilot.layout_kernels import (
     PilotTables,
     clip,
     commanded_trim,
+    load_excess,
     observe,
     outer_command,
     own_reference,
@@ -72,7 +73,7 @@ def mocm_engage(
     state[offset_at + 2] = errors[DISPLAY.altitude]
     state[offset_at + 3] = errors[DISPLAY.climb_rate]
     own_reference(state, reference, own)
-    commanded_trim(tables, own, nacelle_angle, trim)
+    commanded_trim(tables, own, nacelle_angle, load_excess(reference), trim)
     observe(tables, x, own, trim[0], 0.0, errors)
     bilinear(tables, tables.cells, airspeed, nacelle_angle, roles.end, cell)
     plant_reference(tables, own, trim, 0.0, state[last_at : last_at + n])

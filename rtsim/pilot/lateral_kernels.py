@@ -233,6 +233,9 @@ def lateral_advance_in(
     _own(state, wanted, own)
     lateral_trim(tables, own, nacelle, x[STATE.pitch], work[:count], trim)
     # The commanded motion is one that the aircraft can follow: only the lags, which follow the hands, see it move.
+    for k in range(n):
+        if k != mocm.lags[0] and k != mocm.lags[1]:
+            state[last_at + k] = 0.0
     for hand in range(hands):
         lag = mocm.lags[hand]
         state[S_ESTIMATE + lag] -= trim[TRIM.hand + hand] - state[last_at + lag]

@@ -61,6 +61,8 @@ def _tables(database: Database, dt: float) -> LateralPilotTables:
         airspeed=database.airspeed,
         nacelle=database.nacelle,
         trim=np.concatenate([_slip_entries(data), _lead_entries(pilot)], axis=-1),
+        loaded=np.zeros((database.airspeed.size, database.nacelle.size, 1)),
+        load_factor=np.zeros(0),
         cells=cells,
         a_columns=a_columns,
         c_columns=c_columns,

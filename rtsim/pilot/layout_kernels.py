@@ -23,6 +23,7 @@ TARGET = Places(
     "altitude",  # [m]
     "climb_rate",  # [m/s]
     "nacelle_rate",  # commanded for the frame [rad/s]; the pilot's third channel, not used by the MOCM
+    "turn_excess",  # load factor of the turn asked for, less 1
 )
 """Places of what the pilot is asked for, ``reference``."""
 
@@ -128,6 +129,10 @@ class PilotTables(NamedTuple):
     """Nacelle axis (N,) [rad]."""
     trim: FloatArray
     """[pitch, hands] of the level trim; coefficients of acceleration, its square; slopes with airspeed (V, N, k)."""
+    loaded: FloatArray
+    """What the trims at load factors above 1 add to pitch and hands, one load factor after the other (V, N, k)."""
+    load_factor: FloatArray
+    """These load factors (K,); none where the aircraft does not turn."""
     cells: FloatArray
     """Design plant and gains of each grid point, flattened by columns (V, N, block)."""
     a_columns: IntArray
@@ -220,10 +225,36 @@ def capture(state: FloatArray, place: int, limits: tuple[float, float], dt: floa
 
 
 @inner_kernel
-def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: float, out: FloatArray) -> None:
+def load_excess(reference: FloatArray) -> float:
+    """Load factor of the turn asked for, less 1; 0 in a reference that does not know turns."""
+    return reference[TARGET.turn_excess] if reference.shape[0] > TARGET.turn_excess else 0.0
+
+
+@inner_kernel
+def _add_load(tables: PilotTables, airspeed: float, nacelle_angle: float, excess: float, out: FloatArray) -> None:
+    """Add what a turn needs to pitch and hands; the scratch of two orders of acceleration is free by now."""
+    count = 1 + tables.roles.hands
+    loads = tables.load_factor.shape[0]
+    scratch = out[count:]
+    bilinear(tables, tables.loaded, airspeed, nacelle_angle, loads * count, scratch)
+    above, below = 0, 0.0
+    while above < loads - 1 and excess > tables.load_factor[above] - 1.0:
+        below = tables.load_factor[above] - 1.0
+        above += 1
+    share = min((excess - below) / (tables.load_factor[above] - 1.0 - below), 1.0)
+    for k in range(count):
+        before = 0.0 if above == 0 else scratch[count * (above - 1) + k]
+        out[k] += before + share * (scratch[count * above + k] - before)
+
+
+@inner_kernel
+def commanded_trim(
+    tables: PilotTables, reference: FloatArray, nacelle_angle: float, excess: float, out: FloatArray
+) -> None:
     """Pitch and hands of the commanded trim.
 
     Args:
+        excess: Load factor of the turn asked for, less 1.
         out: ``[:1 + nu]`` receives pitch and hands, ``[3 (1 + nu):4 (1 + nu)]`` their slopes with airspeed; the rest
             is scratch.
     """
@@ -233,6 +264,8 @@ def commanded_trim(tables: PilotTables, reference: FloatArray, nacelle_angle: fl
     a = min(limit, max(-limit, reference[TARGET.airspeed_rate]))
     for k in range(count):
         out[k] += a * (out[count + k] + a * out[2 * count + k])
+    if excess > 0.0 and tables.load_factor.shape[0] > 0:
+        _add_load(tables, reference[TARGET.airspeed], nacelle_angle, excess, out)
     # climbing keeps the angle of attack: pitch rises by the path angle, which fades out towards hover
     climb_speed = tables.numbers[NUMBER.climb_speed]
     speed = reference[TARGET.airspeed]

@@ -60,6 +60,7 @@ from rtsim.pilot.layout_kernels import (
     clip,
     commanded_trim,
     demand,
+    load_excess,
     noise_width,
     observe,
     outer_command,
@@ -119,7 +120,7 @@ def mocm_output_in(
     """`mocm_output` in given work space."""
     own = work[4 * (1 + tables.roles.hands) :]
     own_reference(state, reference, own)
-    commanded_trim(tables, own, nacelle_angle, work)
+    commanded_trim(tables, own, nacelle_angle, load_excess(reference), work)
     for hand in range(tables.roles.hands):
         value = work[1 + hand] + demand(tables, state, hand)
         out[hand] = min(tables.limits[1, hand], max(tables.limits[0, hand], value))
@@ -259,7 +260,7 @@ def mocm_advance_in(
 
     # the moving trim: what it moved since the last frame comes off the estimated deviation
     own_reference(state, reference, own)
-    commanded_trim(tables, own, nacelle_angle, trim)
+    commanded_trim(tables, own, nacelle_angle, load_excess(reference), trim)
     pitch_rate = (trim[0] - state[last_at + PLANT.pitch]) / dt
     plant_reference(tables, own, trim, pitch_rate, target)
     for k in range(n):

@@ -16,6 +16,7 @@ from rtsim.kernels.compiled import interpreted
 from rtsim.kernels.kept import kept
 from rtsim.kernels.packed import Size, packed
 from rtsim.lpv.database import Database
+from rtsim.lpv.lateral import LateralData
 from rtsim.outside import understanding
 from rtsim.pilot import layout_kernels as kernels
 from rtsim.pilot.delay import delay_filter
@@ -102,6 +103,8 @@ def _tables(database: Database, pilot: ScheduledPilot, dt: float) -> PilotTables
         airspeed=database.airspeed,
         nacelle=database.nacelle,
         trim=_trim_table(database, layout),
+        loaded=_loaded_table(database, layout),
+        load_factor=np.zeros(0) if database.lateral is None else LateralData.of(database).load_factor,
         cells=cells,
         a_columns=a_columns,
         c_columns=c_columns,
@@ -212,6 +215,18 @@ def _trim_table(database: Database, layout: PlantLayout) -> FloatArray:
         slopes[:orders] = np.tensordot(np.linalg.pinv(powers), steps, axes=1)
     along = _airspeed_slope(base, database)
     return np.ascontiguousarray(np.concatenate([base, slopes[0], slopes[1], along], axis=-1))
+
+
+def _loaded_table(database: Database, layout: PlantLayout) -> FloatArray:
+    """What trims at load factors above 1 add to pitch and hands."""
+    grid = (database.airspeed.size, database.nacelle.size)
+    if database.lateral is None:
+        return np.zeros((*grid, 1))
+    data, level = LateralData.of(database), database.level_layer
+    pitch = data.loaded_x_ref[..., [layout.rigid[3]]] - database.x_ref[level][..., [layout.rigid[3]]]
+    hands = data.loaded_u_ref[..., list(layout.controls)] - database.u_ref[level][..., list(layout.controls)]
+    entries = np.moveaxis(np.concatenate([pitch, hands], axis=-1), 0, 2)
+    return np.ascontiguousarray(entries.reshape(*grid, -1))
 
 
 def _airspeed_slope(base: FloatArray, database: Database) -> FloatArray:

@@ -113,7 +113,7 @@ class LateralPilotSettings:
         return (self.lateral_velocity, self.roll_rate, self.bank, self.yaw_rate, self.heading)
 
 
-_SHARED = ("integral_time", "integral_noise_ratio", "delay", "motor_noise_ratio", "gust_intensity", "gust_length",
+_SHARED = ("integral_noise_ratio", "delay", "motor_noise_ratio", "gust_intensity", "gust_length",
            "gust_least_airspeed", "schedule_time")  # fmt: skip
 _LATERAL_DISPLAYS = (
     ("lateral_velocity", "m_s"), ("roll_rate", "deg_s"), ("bank", "deg"), ("yaw_rate", "deg_s"), ("heading", "deg"),
@@ -123,6 +123,7 @@ _LATERAL_NUMBERS = (
     ("pedal_lag", "s", 0.01, 2.0),
     ("lateral_stick_rate_limit", "per_s", 0.01, 100.0),
     ("pedal_rate_limit", "per_s", 0.01, 100.0),
+    ("integral_time", "s", 0.1, 1000.0),
 )
 _DISPLAYS = (("airspeed", "m_s"), ("altitude", "m"), ("climb_rate", "m_s"), ("pitch", "deg"), ("pitch_rate", "deg_s"))
 _NUMBERS = (

@@ -22,10 +22,16 @@ from rtsim.protection.monitor_kernels import DRIVEN, FAR, KIND, LIMIT, MonitorTa
 from rtsim.protection.tables import law_tables, sample_boundary
 from rtsim.units import DEGREE
 
-SHOWN_AS = {"airspeed": "airspeed_indicated", "nacelle_angle": "nacelle", "flight_path_angle": "flight_path"}
+SHOWN_AS = {
+    "airspeed": "airspeed_indicated",
+    "nacelle_angle": "nacelle",
+    "flight_path_angle": "flight_path",
+    "lateral_velocity": "lateral",
+    "nacelle_ok": "failures",
+}
 """Quantities of the frame that sensors show under another name."""
 _DRIVEN = np.array([QUANTITY.asdict()[name] for name in DRIVEN.asdict()])
-_SENSED = np.array([QUANTITY.asdict()[SHOWN_AS.get(name, name)] for name in Sensors.__slots__ if name != "nacelle_ok"])
+_SENSED = np.array([QUANTITY.asdict()[SHOWN_AS.get(name, name)] for name in Sensors.__slots__])
 
 
 @dataclass(frozen=True, slots=True)

@@ -275,7 +275,7 @@ def sensors_of(rows: FloatArray, columns: IntArray, scales: FloatArray, sensors:
 
     Args:
         rows: The frames' rows, shape (frames, signals).
-        columns: Column of each sensor, ``nacelle_ok`` excepted, which stands in the bits of the failures.
+        columns: Column of each sensor; ``nacelle_ok`` stands in the bits of the failures.
         scales: One unit of these columns in SI.
         sensors: Written, shape (frames, SENSOR.size).
     """

@@ -12,14 +12,14 @@ from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
 from rtsim.systems.ground_kernels import DOWN, FORWARD, GroundTables
-from rtsim.units import FOOT, GRAVITY, INCH, deg, kt
+from rtsim.units import FOOT, GRAVITY, INCH, SLUG_FOOT_SQUARED, deg, kt
 
-_NONE = np.zeros((0, 4))
+_NONE = np.zeros((0, 5))
 
 
 def no_ground() -> GroundTables:
     """What a flight has that has no ground to stand on."""
-    return GroundTables(0.0, 0.0, _NONE, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0)
+    return GroundTables(0.0, 0.0, _NONE, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0)
 
 
 def load_ground_tables(profile: AircraftProfile, tables: AircraftTables) -> GroundTables:
@@ -51,8 +51,9 @@ def load_ground_tables(profile: AircraftProfile, tables: AircraftTables) -> Grou
     share = [-forward[1] / wheelbase, forward[0] / wheelbase]
     pressed = part.number("standing_stroke_fraction", low=0.05, high=0.95)
     damping = part.number("damping_ratio", low=0.0, high=2.0)
+    aside = [0.0, 0.5 * part.number("main_track_in", low=1.0, high=1e3) * INCH]
     wheels = np.array([
-        _wheel(forward[i], down[i], share[i] * mass, pressed * stroke[i], damping) for i in range(2)
+        _wheel((forward[i], down[i], aside[i]), share[i] * mass, pressed * stroke[i], damping) for i in range(2)
     ])  # fmt: skip
     pivot = np.array([tables.mass.pivot[0], tables.mass.pivot[1]])
     inertia = tables.mass.pitch_inertia_airplane + tables.mass.pitch_inertia_slope * deg(90.0)
@@ -66,6 +67,8 @@ def load_ground_tables(profile: AircraftProfile, tables: AircraftTables) -> Grou
         most_sink=part.number("limit_sink_ft_s", low=0.1, high=100.0) * FOOT,
         mass=mass,
         inertia=inertia,
+        roll_inertia=part.number("roll_inertia_slug_ft2", low=1.0, high=1e7) * SLUG_FOOT_SQUARED,
+        yaw_inertia=part.number("yaw_inertia_slug_ft2", low=1.0, high=1e7) * SLUG_FOOT_SQUARED,
         radius=tables.rotor.radius,
         pivot_up=float(pivot[1] - centre[1]),
         mast=tables.mass.mast_length,
@@ -73,10 +76,10 @@ def load_ground_tables(profile: AircraftProfile, tables: AircraftTables) -> Grou
     )
 
 
-def _wheel(forward: float, down: float, mass: float, pressed: float, damping: float) -> FloatArray:
+def _wheel(arm: tuple[float, float, float], mass: float, pressed: float, damping: float) -> FloatArray:
     """One wheel, or pair: its spring carries its share of the mass at the standing stroke."""
     stiffness = mass * GRAVITY / pressed
-    return np.array([forward, down, stiffness, 2.0 * damping * math.sqrt(stiffness * mass)])
+    return np.array([arm[0], arm[1], stiffness, 2.0 * damping * math.sqrt(stiffness * mass), arm[2]])
 
 
 def light_on_wheels(tables: GroundTables, pitch: float) -> float:

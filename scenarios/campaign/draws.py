@@ -70,7 +70,7 @@ def draw_plan(
         programme=programme,
         options=dataclasses.replace(common, **drawn),
         start=start,
-        air=AirSpecification(turbulence=turbulence, gusts=gusts),
+        air=AirSpecification(turbulence=turbulence, gusts=gusts, lateral=item.lateral_turbulence),
         faults=faults,
         pulses=pulses,
         reaction=reaction if yields else None,
@@ -198,5 +198,6 @@ def _gusts(item: ClassTable, generator: Generator) -> list[Gust]:
         duration = max(draw(table.duration_s, generator), 0.1)
         sign = -1.0 if table.either_sign and generator.random() < 0.5 else 1.0
         ahead, below = sign * kt(draw(table.ahead_kt, generator)), sign * kt(draw(table.below_kt, generator))
-        found.append(Gust(start=start, duration=duration, ahead=ahead, below=below))
+        lateral = sign * kt(draw(table.lateral_kt, generator))
+        found.append(Gust(start=start, duration=duration, ahead=ahead, below=below, lateral=lateral))
     return found

@@ -49,6 +49,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "turbulence_kt": (0.0, 100.0),
     "ahead_kt": (-200.0, 200.0),
     "below_kt": (-200.0, 200.0),
+    "lateral_kt": (-200.0, 200.0),
 } | {item.key: (item.low, item.high) for item in CLASS_OPTIONS if item.low is not None and item.high is not None}
 """What numbers and the certain part of distributions must lie in, by key."""
 
@@ -135,6 +136,7 @@ class GustDraw(Strict):
     duration_s: Number
     ahead_kt: Number = 0.0
     below_kt: Number = 0.0
+    lateral_kt: Number = 0.0
     either_sign: bool = False
 
 
@@ -168,6 +170,7 @@ class ClassTable(_ClassOptions, Strict):  # type: ignore[misc]  # made from the 
     faults: list[FaultDraw] = []
     gusts: list[GustDraw] = []
     turbulence_kt: Number = 0.0
+    lateral_turbulence: bool = False
     pilot: PilotDraw = PilotDraw()
 
 

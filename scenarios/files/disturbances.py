@@ -54,6 +54,7 @@ def air_of(table: AirTable) -> AirSpecification:
         turbulence=Turbulence(wind_at_20_ft=wind, fade_in=table.fade_in_s) if wind > 0.0 else None,
         gusts=tuple(_gust(gust) for gust in table.gusts),
         minimum_speed=kt(table.minimum_speed_kt),
+        lateral=table.lateral,
     )
 
 
@@ -77,6 +78,7 @@ def disturbance_event(change: Disturbance) -> tuple[str, str, dict[str, Any]]:
     """
     if isinstance(change, Gust):
         text = f"gust: {to_kt(change.ahead):+.1f} kn from ahead, {change.below:+.1f} m/s from below"
+        text += f", {to_kt(change.lateral):+.1f} kn from the right" if change.lateral else ""
         return "gust", text, asdict(change)
     if isinstance(change, Turbulence):
         wind = to_kt(change.wind_at_20_ft)
@@ -112,6 +114,7 @@ def _gust(table: AirGustTable) -> Gust:
         start=table.time_s,
         ahead=kt(table.ahead_kt),
         below=kt(table.below_kt),
+        lateral=kt(table.lateral_kt),
         shape=table.shape,
         duration=table.duration_s,
         length=table.length_m,

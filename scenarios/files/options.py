@@ -36,6 +36,8 @@ class Overrides(_OptionChanges):  # type: ignore[misc]  # made from the options'
 
     turbulence: Severity | None = None
     """Dryden turbulence in place of the scenario's; its gusts stay."""
+    lateral_turbulence: bool | None = None
+    """Whether turbulence blows from the side, in roll and in yaw too."""
     duration: float | None = None
     start: str | None = None
     """Named start: ``hover``, ``conversion`` or ``cruise``."""
@@ -91,6 +93,10 @@ def _with_options(scenario: Scenario, overrides: Overrides) -> Scenario:
     if overrides.turbulence is not None:
         turbulence = Turbulence.of_severity(overrides.turbulence)
         changed = dataclasses.replace(changed, air=dataclasses.replace(changed.air, turbulence=turbulence))
+    if overrides.lateral_turbulence is not None:
+        changed = dataclasses.replace(
+            changed, air=dataclasses.replace(changed.air, lateral=overrides.lateral_turbulence)
+        )
     if overrides.duration is not None:
         _check_range("--duration", overrides.duration, (1.0 / changed.options.rate_hz, 36_000.0), "s")
         if overrides.duration < changed.duration:

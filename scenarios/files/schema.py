@@ -83,6 +83,7 @@ class AirGustTable(Strict):
     time_s: DurationS
     ahead_kt: GustKt = 0.0
     below_kt: GustKt = 0.0
+    lateral_kt: GustKt = 0.0
     shape: GustShape = "one-minus-cosine"
     duration_s: Annotated[float, Field(ge=0.0, le=3600.0, allow_inf_nan=False)] | None = None
     length_m: Annotated[float, Field(ge=0.0, le=100_000.0, allow_inf_nan=False)] | None = None
@@ -96,6 +97,7 @@ class AirTable(Strict):
     wind_at_20_ft_kt: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False)] | None = None
     fade_in_s: Annotated[float, Field(ge=0.0, le=60.0, allow_inf_nan=False)] = 2.0
     minimum_speed_kt: Annotated[float, Field(ge=2.0, le=150.0, allow_inf_nan=False)] = 30.0
+    lateral: bool = False
     gusts: Annotated[list[AirGustTable], Field(max_length=1000)] = []
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -84,7 +85,7 @@ def mavlink_config(options: MavlinkOptions, scenario: Scenario) -> tuple[Mavlink
         autopilot=options.autopilot,
         rate_hz=float(scenario.options.rate_hz),
         ratings=_ratings(scenario.options.aircraft),
-        home=options.home,
+        home=dataclasses.replace(options.home, heading_deg=to_deg(scenario.options.heading)),
         aids={name: name in aids_on for name in SWITCHES},
         parameters=stick_settings(stick_map).parameters(),
         parameter_file=str(parameter_file) if parameter_file is not None else None,

@@ -22,6 +22,12 @@ _TITLES = {
     "plots/corridor/deg": "Nacelle travel to the corridor",
     "plots/nacelle/deg_per_s": "Nacelle rate",
     "plots/air/m_per_s": "Gusts",
+    "plots/air/deg_per_s": "Gusts in roll, pitch and yaw",
+    "plots/attitude/deg_per_s": "Body rates and turn rate",
+    "plots/course/deg": "Heading and course",
+    "plots/loads/plain": "Load factors",
+    "plots/power/in_lb": "Mast torque",
+    "plots/wind/m_per_s": "Wind towards north and east",
     "plots/protection/plain": "Changed by protection",
     "plots/protection/reason": "Limits acted for",
 }

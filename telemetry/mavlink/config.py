@@ -71,8 +71,8 @@ class HomePosition:
     """East positive [deg]."""
     altitude_m: float = 0.0
     """Ground elevation above mean sea level [m]; 0 because the model flies in sea-level air at every height."""
-    heading_deg: float = 350.0
-    """True heading, fixed: the model is symmetric and does not turn [deg]."""
+    heading_deg: float = 0.0
+    """True heading at the start [deg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import TIMING_SIGNALS
-from rtsim.units import KNOT, deg, to_deg
+from rtsim.units import KNOT, deg
 from telemetry.mavlink.config import HomePosition
 from telemetry.mavlink.fields import real, whole, wrapped
 from telemetry.mavlink.state import INPUT_LIVE, PILOT_EXTERNAL, PILOT_HOLD, FlightState
@@ -28,6 +28,11 @@ def loop_value(state: FlightState, name: str) -> float:
     return float(state.timing[_TIMING[name]])
 
 
+def _compass(angle_deg: float, per_degree: int) -> int:
+    """A direction in whole parts of a degree, from 0 on."""
+    return whole(per_degree * angle_deg, 0, 360 * per_degree) % (360 * per_degree)
+
+
 class FlightMessages:
     """Builds the messages from the newest row."""
 
@@ -39,7 +44,6 @@ class FlightMessages:
             state: The flight, kept up to date by the vehicle.
         """
         self._home, self._state = home, state
-        self._heading = home.heading_deg % 360.0
         self._metres_per_degree_east = METRES_PER_DEGREE * max(math.cos(deg(home.latitude_deg)), 0.01)
 
     def attitude(self) -> list[Any]:
@@ -48,49 +52,46 @@ class FlightMessages:
         return [
             dialect.MAVLink_attitude_message(
                 self._state.boot_ms,
-                0.0,
-                real(deg(value("pitch_deg"))),
-                wrapped(deg(self._heading)),
-                0.0,
-                real(deg(value("pitch_rate_deg_s"))),
-                0.0,
+                *(real(wrapped(angle)) for angle in self._angles()),
+                *(real(deg(value(f"{axis}_rate_deg_s"))) for axis in ("roll", "pitch", "yaw")),
             )
         ]
+
+    def _angles(self) -> tuple[float, float, float]:
+        """Bank, pitch and heading [rad]."""
+        bank, pitch, heading = (deg(self._state.value(name)) for name in ("bank_deg", "pitch_deg", "heading_deg"))
+        return bank, pitch, heading
 
     def attitude_quaternion(self) -> list[Any]:
         """ATTITUDE_QUATERNION, the same attitude."""
-        half_pitch = 0.5 * deg(self._state.value("pitch_deg"))
-        half_yaw = 0.5 * wrapped(deg(self._heading))
-        cp, sp, cy, sy = math.cos(half_pitch), math.sin(half_pitch), math.cos(half_yaw), math.sin(half_yaw)
-        rate = real(deg(self._state.value("pitch_rate_deg_s")))
-        return [
-            dialect.MAVLink_attitude_quaternion_message(
-                self._state.boot_ms, cp * cy, -sp * sy, sp * cy, cp * sy, 0.0, rate, 0.0
-            )
-        ]
+        (cr, sr), (cp, sp), (cy, sy) = (
+            (math.cos(0.5 * wrapped(angle)), math.sin(0.5 * wrapped(angle))) for angle in self._angles()
+        )
+        turned = (
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        )
+        rates = (deg(self._state.value(f"{axis}_rate_deg_s")) for axis in ("roll", "pitch", "yaw"))
+        return [dialect.MAVLink_attitude_quaternion_message(self._state.boot_ms, *map(real, (*turned, *rates)))]
 
     def _ground_velocity(self) -> tuple[float, float, float]:
         """North, east, down [m/s]."""
-        speed = self._state.value("ground_speed_kt") * KNOT
-        heading = deg(self._heading)
-        return speed * math.cos(heading), speed * math.sin(heading), -self._state.value("climb_rate_m_s")
-
-    def _ground_position(self) -> tuple[float, float]:
-        """North and east of the start [m]."""
-        distance, heading = self._state.value("distance_m"), deg(self._heading)
-        return distance * math.cos(heading), distance * math.sin(heading)
+        speed, track = abs(self._state.value("ground_speed_kt")) * KNOT, deg(self._state.value("track_deg"))
+        return speed * math.cos(track), speed * math.sin(track), -self._state.value("climb_rate_m_s")
 
     def local_position(self) -> list[Any]:
         """LOCAL_POSITION_NED: from the start on the ground below."""
-        north, east = self._ground_position()
-        fields = north, east, -self._state.value("altitude_m"), *self._ground_velocity()
+        value = self._state.value
+        fields = value("north_m"), value("east_m"), -value("altitude_m"), *self._ground_velocity()
         return [dialect.MAVLink_local_position_ned_message(self._state.boot_ms, *map(real, fields))]
 
     def _latitude_longitude(self) -> tuple[int, int]:
         """Position in 1e-7 degrees."""
-        north, east = self._ground_position()
-        latitude = self._home.latitude_deg + north / METRES_PER_DEGREE
-        longitude = self._home.longitude_deg + east / self._metres_per_degree_east
+        value = self._state.value
+        latitude = self._home.latitude_deg + value("north_m") / METRES_PER_DEGREE
+        longitude = self._home.longitude_deg + value("east_m") / self._metres_per_degree_east
         longitude = (longitude + 180.0) % 360.0 - 180.0
         return whole(latitude * 1e7, -900_000_000, 900_000_000), whole(longitude * 1e7, -1_800_000_000, 1_800_000_000)
 
@@ -99,6 +100,7 @@ class FlightMessages:
 
     def global_position(self) -> list[Any]:
         """GLOBAL_POSITION_INT."""
+        value = self._state.value
         latitude, longitude = self._latitude_longitude()
         north, east, down = (whole(100.0 * speed, -32767, 32767) for speed in self._ground_velocity())
         return [
@@ -107,11 +109,11 @@ class FlightMessages:
                 latitude,
                 longitude,
                 whole(1000.0 * self._altitude_amsl(), -(2**31), 2**31 - 1),
-                whole(1000.0 * self._state.value("altitude_m"), -(2**31), 2**31 - 1),
+                whole(1000.0 * value("altitude_m"), -(2**31), 2**31 - 1),
                 north,
                 east,
                 down,
-                whole(100.0 * self._heading, 0, 35999),
+                _compass(value("heading_deg"), 100),
             )
         ]
 
@@ -122,7 +124,7 @@ class FlightMessages:
             dialect.MAVLink_vfr_hud_message(
                 real(abs(value("airspeed_kt")) * KNOT),
                 real(abs(value("ground_speed_kt")) * KNOT),
-                whole(self._heading, 0, 359),
+                _compass(value("heading_deg"), 1),
                 whole(100.0 * value("lever"), 0, 100),
                 real(self._altitude_amsl()),
                 real(value("climb_rate_m_s")),
@@ -141,6 +143,8 @@ class FlightMessages:
             b"trq_pct": state.torque_pct,
             b"wflap_deg": value("flap_deg"),
             b"in_age_ms": 1e3 * state.feedback.age,
+            b"slip_deg": value("sideslip_deg"),
+            b"ball_g": value("lateral_acceleration"),
         }
         stamp = state.boot_ms
         return [dialect.MAVLink_named_value_float_message(stamp, name, real(v)) for name, v in values.items()]
@@ -165,6 +169,12 @@ class FlightMessages:
             state.shown_pedal,
             value("corridor_level"),
             value("flap_deg"),
+            value("sideslip_deg"),
+            value("lateral_acceleration"),
+            value("flapping_left_deg"),
+            value("flapping_right_deg"),
+            state.share_of_torque("mast_torque_left_inlb"),
+            state.share_of_torque("mast_torque_right_inlb"),
         ]
         data = [real(number) for number in numbers] + [0.0] * (58 - len(numbers))
         return [dialect.MAVLink_debug_float_array_message(state.boot_us, b"xv15", 1, data)]
@@ -187,17 +197,35 @@ class FlightMessages:
         return [dialect.MAVLink_rc_channels_message(state.boot_ms, 8, *raw, rssi)]
 
     def servo_output(self) -> list[Any]:
-        """SERVO_OUTPUT_RAW: elevator, cyclic, collective, nacelle, flaps."""
+        """SERVO_OUTPUT_RAW: elevator, cyclic, collective, nacelle, flaps, aileron, rudder; both rotors."""
         value = self._state.value
+        collective, cyclic = value("collective_75_deg"), value("cyclic_deg")
+        collectives = [collective + side * value("differential_collective_deg") for side in (-1.0, 1.0)]
+        cyclics = [cyclic + side * value("differential_cyclic_deg") for side in (-1.0, 1.0)]
         outputs = (
             1500.0 + 500.0 * value("elevator_deg") / 20.0,
-            1500.0 + 500.0 * value("cyclic_deg") / 10.0,
-            1000.0 + 1000.0 * value("collective_75_deg") / 50.0,
+            1500.0 + 500.0 * cyclic / 10.0,
+            1000.0 + 1000.0 * collective / 50.0,
             1000.0 + 1000.0 * value("nacelle_deg") / 90.0,
             1000.0 + 1000.0 * value("flap_deg") / 75.0,
+            1500.0 + 500.0 * value("aileron_deg") / 20.0,
+            1500.0 + 500.0 * value("rudder_deg") / 20.0,
+            *(1000.0 + 1000.0 * angle / 50.0 for angle in collectives),
+            *(1500.0 + 500.0 * angle / 10.0 for angle in cyclics),
         )
-        raw = [whole(output, 800, 2200) for output in outputs] + [0, 0, 0]
+        raw = [whole(output, 800, 2200) for output in outputs]
         return [dialect.MAVLink_servo_output_raw_message(self._state.boot_us & 0xFFFFFFFF, 0, *raw)]
+
+    def wind(self) -> list[Any]:
+        """WIND_COV: where the steady wind blows to; how it varies is not known."""
+        value = self._state.value
+        wind = real(value("wind_north_m_s")), real(value("wind_east_m_s")), 0.0
+        unknown = math.nan
+        return [
+            dialect.MAVLink_wind_cov_message(
+                self._state.boot_us, *wind, unknown, unknown, real(self._altitude_amsl()), unknown, unknown
+            )
+        ]
 
     def altitude(self) -> list[Any]:
         """ALTITUDE."""
@@ -208,9 +236,7 @@ class FlightMessages:
     def gps(self) -> list[Any]:
         """GPS_RAW_INT: a perfect receiver."""
         latitude, longitude = self._latitude_longitude()
-        north, east, _ = self._ground_velocity()
-        speed = math.hypot(north, east)
-        course = to_deg(math.atan2(east, north)) % 360.0 if speed > 0.1 else self._heading
+        speed = abs(self._state.value("ground_speed_kt")) * KNOT
         altitude = whole(1000.0 * self._altitude_amsl(), -(2**31), 2**31 - 1)
         return [
             dialect.MAVLink_gps_raw_int_message(
@@ -222,7 +248,7 @@ class FlightMessages:
                 100,
                 100,
                 whole(100.0 * speed, 0, 65534),
-                whole(100.0 * course, 0, 35999),
+                _compass(self._state.value("track_deg"), 100),
                 12,
                 altitude,
             )

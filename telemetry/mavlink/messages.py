@@ -22,6 +22,7 @@ HEARTBEAT, SYS_STATUS, SYSTEM_TIME, EXTENDED_SYS_STATE, CURRENT_MODE, HOME_POSIT
 ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION, GLOBAL_POSITION, VFR_HUD = 30, 31, 32, 33, 74
 NAMED_VALUE_FLOAT, DEBUG_FLOAT_ARRAY, RC_CHANNELS, SERVO_OUTPUT, ALTITUDE = 251, 350, 65, 36, 141
 GPS_RAW, BATTERY_STATUS, AUTOPILOT_VERSION, AVAILABLE_MODES, MESSAGE_INTERVAL = 24, 147, 148, 435, 244
+WIND = 231
 
 _SENSORS = 0x1 | 0x2 | 0x4 | 0x8 | 0x10 | 0x20 | 0x200000  # gyro, accelerometer, magnetometer, baro, pitot, GPS, AHRS
 _RC_RECEIVER, _PREARM = 0x10000, 0x10000000
@@ -40,7 +41,6 @@ class MessageFactory:
             state: The flight, kept up to date by the vehicle.
         """
         self._config, self._state = config, state
-        self._heading = config.home.heading_deg % 360.0
         flight = FlightMessages(config.home, state)
         self._builders: Mapping[int, Callable[[], list[Any]]] = {
             HEARTBEAT: self._heartbeat,
@@ -58,6 +58,7 @@ class MessageFactory:
             SERVO_OUTPUT: flight.servo_output,
             ALTITUDE: flight.altitude,
             GPS_RAW: flight.gps,
+            WIND: flight.wind,
             BATTERY_STATUS: self._battery,
             HOME_POSITION: self._home,
             CURRENT_MODE: self._current_mode,
@@ -187,7 +188,7 @@ class MessageFactory:
 
     def _home(self) -> list[Any]:
         home = self._config.home
-        half_yaw = 0.5 * wrapped(deg(self._heading))
+        half_yaw = 0.5 * wrapped(deg(home.heading_deg))
         return [
             dialect.MAVLink_home_position_message(
                 whole(home.latitude_deg * 1e7, -900_000_000, 900_000_000),

@@ -90,7 +90,7 @@ class NoticeBoard:
             enabled: Whether warnings are wanted.
         """
         level, state.worst_level = state.worst_level, int(state.value("corridor_level"))
-        flapping, torque = state.value("flapping_deg"), state.torque_pct
+        flapping, torque = state.flapping_deg, state.torque_pct
         high_flapping = flapping > (_FLAPPING_CLEAR_DEG if self._flapping else _FLAPPING_WARNING_DEG)
         high_torque = torque > (_TORQUE_CLEAR_PCT if self._torque else _TORQUE_WARNING_PCT)
         if enabled:

@@ -135,12 +135,25 @@ class FlightState:
 
     @property
     def torque_pct(self) -> float:
-        """Mast torque in per cent of its limit in this mode of flight."""
+        """Torque of the more loaded mast in per cent of its limit in this mode of flight."""
+        return max(self.share_of_torque(f"mast_torque{side}_inlb") for side in ("", "_left", "_right"))
+
+    @property
+    def flapping_deg(self) -> float:
+        """Flapping of the rotor that flaps more [deg]."""
+        return max(self.value(f"flapping{side}_deg") for side in ("", "_left", "_right"))
+
+    def share_of_torque(self, name: str) -> float:
+        """A mast torque in per cent of its limit in this mode of flight.
+
+        Args:
+            name: Its column.
+        """
         full = self.ratings
         upright = self.value("nacelle_deg") > full.hover_nacelle_deg
         helicopter = upright and self.value("airspeed_kt") < full.hover_airspeed_kt
         limit = full.hover_torque_inlb if helicopter else full.torque_inlb
-        return 100.0 * self.value("mast_torque_inlb") / limit
+        return 100.0 * self.value(name) / limit
 
     @property
     def rotor_speed_pct(self) -> float:

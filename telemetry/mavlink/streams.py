@@ -22,6 +22,7 @@ DEFAULT_RATES_HZ: dict[int, float] = {
     ids.SERVO_OUTPUT: 2.0,
     ids.ALTITUDE: 2.0,
     ids.GPS_RAW: 2.0,
+    ids.WIND: 1.0,
     ids.BATTERY_STATUS: 1.0,
     ids.HOME_POSITION: 0.5,
     ids.SYSTEM_TIME: 1.0,

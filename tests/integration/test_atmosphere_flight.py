@@ -76,6 +76,32 @@ def test_severity_none_is_bit_for_bit_calm():
         assert calm[:, getattr(COLUMN, name)].tobytes() == bytes(8 * 400)
 
 
+def test_lateral_turbulence_comes_from_a_stream_of_its_own():
+    """With it, what was there stays to the last bit; what is new differs by seed; cut or restored, it is the same."""
+    lateral = dataclasses.replace(MODERATE, lateral=True)
+    plain, rough = (Simulation(hold(80.0, 75.0, air=air, seed=4)).run(600) for air in (MODERATE, lateral))
+    new = [COLUMN.gust_v_m_s, COLUMN.gust_p_deg_s, COLUMN.gust_r_deg_s]
+    old = slice(0, COLUMN.bank_deg)
+    assert plain[:, old].tobytes() == rough[:, old].tobytes()
+    assert not plain[:, new].any()
+    assert (np.ptp(rough[:, new], axis=0) > [0.5, 0.5, 0.2]).all()
+    other = Simulation(hold(80.0, 75.0, air=lateral, seed=5)).run(600)
+    assert abs(np.corrcoef(rough[:, new[0]], other[:, new[0]])[0, 1]) < 0.9
+    simulation = Simulation(hold(80.0, 75.0, air=lateral, seed=4))
+    simulation.run(123)
+    snapshot = simulation.snapshot()
+    np.testing.assert_array_equal(flown(simulation, 77), rough[123:200])
+    simulation.restore(snapshot)
+    np.testing.assert_array_equal(simulation.run(477), rough[123:])
+
+
+def test_turbulence_that_begins_in_flight_is_lateral_where_the_air_is_said_to_be():
+    simulation = Simulation(hold(80.0, 75.0, air=AirSpecification(lateral=True)))
+    assert not simulation.run(50)[:, COLUMN.gust_v_m_s].any()
+    simulation.disturb(Turbulence.of_severity("severe", fade_in=0.0))
+    assert simulation.run(100)[5:, COLUMN.gust_p_deg_s].all()
+
+
 def test_pilot_noise_and_turbulence_are_independent_streams():
     """Switching one on does not change the other's numbers; another seed changes both."""
     quiet = Simulation(hold(80.0, 75.0, air=MODERATE, seed=4)).run(250)

@@ -153,10 +153,25 @@ duration_s = 4.0
 [start]
 airspeed_kt = 80
 nacelle_deg = 75
+[flight]
+heading_deg = 120
+wind_kt = 12
+wind_from_deg = 200
+wind_reference_height_m = 10
 [air]
 turbulence = "moderate"
+lateral = true
 fade_in_s = 0.5
-gusts = [{ time_s = 1.0, below_kt = 6, length_m = 80 }, { time_s = 2.0, ahead_kt = -5, duration_s = 0, shape = "ramp" }]
+[[air.gusts]]
+time_s = 1.0
+below_kt = 6
+lateral_kt = 5
+length_m = 80
+[[air.gusts]]
+time_s = 2.0
+ahead_kt = -5
+duration_s = 0
+shape = "ramp"
 [[faults]]
 kind = "actuator-slow"
 actuator = "cyclic"
@@ -197,6 +212,11 @@ def test_scenario_to_log_to_replay(tmp_path):
     assert told == [("failure: cyclic slow", 250), ("mended: cyclic slow", 625), ("failure: engine limit", 750)]
     gust = record.rows[:, COLUMN.gust_w_m_s]
     assert np.ptp(gust) > kt(4.0)
+    assert np.ptp(record.rows[:, COLUMN.gust_v_m_s]) > kt(4.0)
+    assert record.rows[:, COLUMN.gust_r_deg_s].any()
+    wind = record.rows[0, [COLUMN.wind_north_m_s, COLUMN.wind_east_m_s]]
+    assert np.degrees(np.arctan2(-wind[1], -wind[0])) % 360.0 == pytest.approx(200.0)
+    assert np.hypot(*wind) > kt(12.0)  # at 100 m, given at 10 m
     result = replay_log(path)
     assert result.same, result.difference
 
@@ -208,7 +228,11 @@ def test_scenario_to_log_to_replay(tmp_path):
         ("fade_in_s = 0.5", "wind_at_20_ft_kt = 20", ["air.turbulence: is given twice", "delete wind_at_20_ft_kt"]),
         ("fade_in_s = 0.5", "fade_in_s = 99", ["air.fade_in_s: is out of range", "0 to 60"]),
         ("below_kt = 6", "below_kt = 66", ["air.gusts[0].below_kt: is out of range", "-60 to 60"]),
-        (", length_m = 80", "", ["air.gusts[0]: needs either a duration or a length", "duration_s or length_m"]),
+        ("lateral_kt = 5", "lateral_kt = 66", ["air.gusts[0].lateral_kt: is out of range", "-60 to 60"]),
+        ("lateral = true", 'lateral = "left"', ["air.lateral"]),
+        ("wind_from_deg = 200", "wind_from_deg = 400", ["flight.wind_from_deg: is out of range", "0 to 360"]),
+        ("wind_reference_height_m = 10", "wind_reference_height_m = 0", ["flight.wind_reference_height_m", "1 to 300"]),
+        ("length_m = 80\n", "", ["air.gusts[0]: needs either a duration or a length", "duration_s or length_m"]),
         ("length_m = 80", "length_m = 0", ["air.gusts[0].length_m: is out of range", "got 0"]),
         ("length_m = 80", "span = 80", ["air.gusts[0].span: is not a known key"]),
         ('shape = "ramp"', 'shape = "step"', ["air.gusts[1].shape", "one-minus-cosine, build-up, ramp"]),

@@ -124,6 +124,7 @@ def small_database():
     level = [whole.level_layer]
     return replace(
         whole,
+        lateral=None,
         layer_acceleration=whole.layer_acceleration[level],
         airspeed=whole.airspeed[speeds],
         nacelle=whole.nacelle[angles],

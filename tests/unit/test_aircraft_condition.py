@@ -198,6 +198,7 @@ def toy() -> Database:
         flap=shipped.flap[speeds, angles],
         attributes={**shipped.attributes, **LIGHT_AND_HIGH.attributes},
         pilot={},
+        lateral=None,
         **{name: getattr(shipped, name)[:, speeds, angles] for name in arrays},
     )
 

@@ -8,7 +8,7 @@ import pytest
 from rtsim.aircraft.atmosphere import standard_atmosphere
 from rtsim.aircraft.points import Condition
 from rtsim.aircraft.table_kernels import curve, surface
-from rtsim.aircraft.variables import INPUT, INPUTS, OUTPUT, STATE, STATES
+from rtsim.aircraft.variables import ALL_INPUTS, ALL_STATES, INPUT, INPUTS, OUTPUT, STATE, STATES, whole
 from rtsim.aircraft.xv15 import airframe_kernels as airframe
 from rtsim.aircraft.xv15 import dynamics_kernels as kernels
 from rtsim.aircraft.xv15 import tail_kernels
@@ -207,13 +207,16 @@ def test_no_table_holds_a_gap():
     assert TABLES.tail.pressure_ratio.nodes[..., 0].max() <= 2.45
 
 
+SLIP = TABLES.lateral.sideslip
+
+
 def test_rotor_wake_is_an_upwash_at_the_tail():
     """At 80 kn in helicopter mode the rotor wake lifts the tail: more of it, nose down (S2 tail loads confirm)."""
     air = TABLES.configuration
     arm = (-6.57, -0.54)
     flow, setting = (kt(80.0), kt(80.0) * np.tan(deg(-9.0)), 0.0), (deg(90.0), deg(40.0), 0.0)
-    without = tail_kernels.tail_load(TABLES.tail, air, flow, setting, 0.0, arm)
-    with_wake = tail_kernels.tail_load(TABLES.tail, air, flow, setting, 5.5, arm)
+    without = tail_kernels.tail_load(TABLES.tail, air, flow, setting, 0.0, arm, SLIP, 0.0)
+    with_wake = tail_kernels.tail_load(TABLES.tail, air, flow, setting, 5.5, arm, SLIP, 0.0)
     assert with_wake[1] < without[1] - 100.0
     assert with_wake[2] < without[2]
     assert surface(TABLES.tail.rotor_wake, 0, deg(-8.0), kt(80.0)) == pytest.approx(-1.05, abs=1e-3)
@@ -223,12 +226,12 @@ def test_elevator_and_downwash_signs():
     """Trailing edge down lifts the tail; wing downwash lowers its lift."""
     air, arm = TABLES.configuration, (-6.57, -0.54)
     flow = (70.0, 3.0, 0.0)
-    zero = tail_kernels.tail_load(TABLES.tail, air, flow, (0.0, 0.0, 0.0), 0.0, arm)
-    down = tail_kernels.tail_load(TABLES.tail, air, flow, (0.0, 0.0, deg(5.0)), 0.0, arm)
-    flapped = tail_kernels.tail_load(TABLES.tail, air, flow, (0.0, deg(40.0), 0.0), 0.0, arm)
+    zero = tail_kernels.tail_load(TABLES.tail, air, flow, (0.0, 0.0, 0.0), 0.0, arm, SLIP, 0.0)
+    down = tail_kernels.tail_load(TABLES.tail, air, flow, (0.0, 0.0, deg(5.0)), 0.0, arm, SLIP, 0.0)
+    flapped = tail_kernels.tail_load(TABLES.tail, air, flow, (0.0, deg(40.0), 0.0), 0.0, arm, SLIP, 0.0)
     assert down[1] < zero[1] < flapped[1]
     rate = (70.0, 3.0, 0.1)
-    assert tail_kernels.tail_load(TABLES.tail, air, rate, (0.0, 0.0, 0.0), 0.0, arm)[2] < zero[2]
+    assert tail_kernels.tail_load(TABLES.tail, air, rate, (0.0, 0.0, 0.0), 0.0, arm, SLIP, 0.0)[2] < zero[2]
 
 
 def test_wing_interference_law():
@@ -341,10 +344,10 @@ def test_rk4_step_converges():
     path = np.tile([condition.nacelle_angle, 0.0, 0.0], (3, 1))
 
     def fly(dt, steps):
-        x, u = point.x.copy(), point.u.copy()
+        x, u = whole(point.x, ALL_STATES), whole(point.u, ALL_INPUTS)
         x[STATE.q] += 0.05
         u[0] += 0.05
-        work = np.zeros(kernels.WORK_COUNT + 6 * len(STATES))
+        work = np.zeros(kernels.WORK_COUNT + kernels.STEP_SIZE)
         for _ in range(steps):
             kernels.step(TABLES, x, u, path, dt, work)
         return x

@@ -7,6 +7,7 @@ Tolerances of the statistical tests were chosen before the first run: 10 % for a
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -41,26 +42,43 @@ def pitch_spectrum(frequency, *, sigma, scale, speed, span):
     return gain * vertical_spectrum(frequency, sigma=sigma, scale=scale, speed=speed)
 
 
+def roll_spectrum(frequency, *, sigma, scale, speed, span):
+    """MIL-F-8785C 3.7.1.4, of the roll gust, one-sided in angular frequency; vertical intensity and scale."""
+    height = sigma**2 / (speed * scale) * 0.8 * (math.pi * scale / (4.0 * span)) ** (1.0 / 3.0)
+    return height / (1.0 + (4.0 * span * frequency / (math.pi * speed)) ** 2)
+
+
+def yaw_spectrum(frequency, *, sigma, scale, speed, span):
+    """MIL-F-8785C 3.7.1.4: of the yaw gust that goes with the gust from the side."""
+    wave = frequency / speed
+    gain = wave**2 / (1.0 + (3.0 * span * wave / math.pi) ** 2)
+    return gain * vertical_spectrum(frequency, sigma=sigma, scale=scale, speed=speed)
+
+
 DT = 0.004
 SPAN = 32.17 * FOOT
 MODERATE = AirSpecification(turbulence=Turbulence(wind_at_20_ft=kt(30.0), fade_in=0.0))
 TABLES = gust_tables(MODERATE)
+LATERAL = dataclasses.replace(MODERATE, lateral=True)
+LEVEL = (0.0, 0.0)
 
 
 @allocating_kernel
 def loop(tables, state, speed, altitude, dt, history):
-    """Replace each row of normals by the gusts: ahead, below, pitch."""
-    out = np.empty(3)
+    """Replace each row of normals by the gusts: ahead, below, pitch; where there are six, from the right, roll, yaw."""
     for k in range(history.shape[0]):
-        gust_step(tables, state, speed[k], altitude[k], 0.0, k * dt, dt if k else 0.0, history[k], out)
+        gust_step(tables, state, speed[k], altitude[k], (0.0, 0.0), k * dt, dt if k else 0.0, history[k])
         history[k, 0], history[k, 1], history[k, 2] = state[GUST.ahead], state[GUST.below], state[GUST.q]
+        if history.shape[1] > 3:
+            history[k, 3], history[k, 4], history[k, 5] = state[GUST.right], state[GUST.p], state[GUST.r]
 
 
 def fly(air, *, speed, altitude, seconds, seed, dt=DT):
-    """Columns ahead, below, pitch gust over time at a constant condition."""
+    """Columns ahead, below, pitch gust, and of lateral turbulence right, roll, yaw, at a constant condition."""
     random = np.random.default_rng(seed)
-    state = new_gust_state(air, random.standard_normal(3))
-    history = random.standard_normal((round(seconds / dt), 3))
+    width = 6 if air.lateral else 3
+    state = new_gust_state(air, random.standard_normal(width))
+    history = random.standard_normal((round(seconds / dt), width))
     loop(gust_tables(air), state, np.full(len(history), speed), np.full(len(history), altitude), dt, history)
     return history
 
@@ -179,8 +197,8 @@ def half_octaves(frequency, values, edges):
     [(kt(60.0), 30.0), (kt(120.0), 100.0), (0.0, 100.0), (kt(170.0), 900.0)],
     ids=["60 kn at 30 m", "120 kn at 100 m", "hover at 100 m", "170 kn at 900 m"],
 )
-def test_spectra_of_all_three_gusts_are_the_analytic_ones(speed, altitude):
-    history = fly(MODERATE, speed=speed, altitude=altitude, seconds=12_000.0, seed=11)
+def test_spectra_of_all_six_gusts_are_the_analytic_ones(speed, altitude):
+    history = fly(LATERAL, speed=speed, altitude=altitude, seconds=12_000.0, seed=11)
     sigma_u, sigma_w, scale_u, scale_w = dryden.turbulence_scales(TABLES.turbulence, altitude, kt(30.0))
     through = max(speed, kt(30.0))
     edges = np.geomspace(0.2, 12.8, 13)
@@ -191,6 +209,9 @@ def test_spectra_of_all_three_gusts_are_the_analytic_ones(speed, altitude):
         longitudinal_spectrum(omega, sigma=sigma_u, scale=scale_u, speed=through),
         vertical_spectrum(omega, sigma=sigma_w, scale=scale_w, speed=through),
         pitch_spectrum(omega, sigma=sigma_w, scale=scale_w, speed=through, span=SPAN),
+        vertical_spectrum(omega, sigma=sigma_u, scale=scale_u, speed=through),
+        roll_spectrum(omega, sigma=sigma_w, scale=scale_w, speed=through, span=SPAN),
+        yaw_spectrum(omega, sigma=sigma_u, scale=scale_u, speed=through, span=SPAN),
     )
     for column, spectrum in enumerate(expected):
         ratio = half_octaves(frequency, measured[:, column], edges) / half_octaves(
@@ -206,6 +227,39 @@ def test_variances_are_those_of_the_specification(speed, altitude):
     assert history[:, 0].var() == pytest.approx(sigma_u**2, rel=0.05)
     assert history[:, 1].var() == pytest.approx(sigma_w**2, rel=0.05)
     assert abs(np.corrcoef(history[:, 0], history[:, 1])[0, 1]) < 0.05
+
+
+def test_the_intensity_in_roll_is_the_integral_of_its_spectrum():
+    frequency = np.concatenate([[0.0], np.geomspace(1e-5, 1e5, 200_001)])
+    spectrum = roll_spectrum(frequency, sigma=1.5, scale=30.0, speed=40.0, span=SPAN)
+    intensity = dryden.roll_intensity(SPAN, 1.5, 30.0)
+    assert np.trapezoid(spectrum, frequency) == pytest.approx(intensity**2, rel=1e-3)
+    assert intensity == pytest.approx(math.radians(5.72), rel=0.02)
+
+
+def test_lateral_turbulence_leaves_the_others_as_they_are():
+    """The first three normals do what they did; the last three act on side, roll and yaw alone, which are three."""
+    random = np.random.default_rng(2)
+    first, normals = random.standard_normal(6), random.standard_normal((500, 6))
+    where = (np.full(500, 40.0), np.full(500, 60.0), DT)
+    both, plain = normals.copy(), normals[:, :3].copy()
+    loop(TABLES, new_gust_state(LATERAL, first), *where, both)
+    loop(TABLES, new_gust_state(MODERATE, first[:3]), *where, plain)
+    assert both[:, :3].tobytes() == plain.tobytes()
+    assert (both[:, 3:] != 0.0).any(axis=0).all()
+
+
+def test_the_yaw_gust_is_the_slope_of_the_side_gust_met_from_ahead():
+    """Air that comes from the right more and more ahead is felt as the nose yawing right into it."""
+    state = np.zeros(dryden.TURBULENCE.size)
+    state[dryden.TURBULENCE.active] = state[dryden.TURBULENCE.lateral] = 1.0
+    state[dryden.TURBULENCE.wind] = state[dryden.TURBULENCE.wind_target] = kt(30.0)
+    state[dryden.TURBULENCE.v_1] = 1.0
+    gusts = [dryden.turbulence_step(TABLES.turbulence, state, 50.0, 100.0, dt, np.zeros(6)) for dt in (0.0, DT)]
+    slope = (gusts[1][3] - gusts[0][3]) / (50.0 * DT)
+    a = DT * 50.0 * math.pi / (3.0 * SPAN)
+    assert gusts[1][5] == pytest.approx(slope * -math.expm1(-a), rel=1e-9)
+    assert gusts[0][5] == 0.0
 
 
 def test_a_change_of_speed_and_height_leaves_no_transient():
@@ -227,13 +281,12 @@ def test_a_change_of_speed_and_height_leaves_no_transient():
 def test_a_step_of_speed_moves_no_gust():
     """The gust of a frame depends on what was flown before, so the coefficients' jump cannot show in it."""
     state = new_gust_state(MODERATE, np.array([0.3, -0.8, 1.2]))
-    out, after = np.empty(3), np.empty(3)
-    gust_step(TABLES, state, 20.0, 50.0, 0.0, 0.0, 0.0, np.zeros(3), out)
-    for k in range(1, 500):
-        gust_step(TABLES, state, 20.0, 50.0, 0.0, k * DT, DT, np.zeros(3), out)
-    gust_step(TABLES, state, 80.0, 50.0, 0.0, 500 * DT, DT, np.zeros(3), after)
+    for k in range(500):
+        gust_step(TABLES, state, 20.0, 50.0, LEVEL, k * DT, DT if k else 0.0, np.zeros(3))
+    before = state[[GUST.u, GUST.w]]
+    gust_step(TABLES, state, 80.0, 50.0, LEVEL, 500 * DT, DT, np.zeros(3))
     reach = 80.0 * DT / 50.0
-    assert np.abs(after[:2] - out[:2]).max() < 3.0 * reach * np.abs(out[:2]).max()
+    assert np.abs(state[[GUST.u, GUST.w]] - before).max() < 3.0 * reach * np.abs(before).max()
 
 
 def test_the_pitch_gust_is_the_slope_of_the_vertical_gust_met_from_ahead():
@@ -254,25 +307,26 @@ def test_normals_of_the_first_state_are_its_filters():
     state = new_gust_state(MODERATE, np.array([0.3, -0.8, 1.2]))
     assert state[dryden.TURBULENCE.u] == 0.3
     assert (state[dryden.TURBULENCE.w_1], state[dryden.TURBULENCE.w_2]) == (-0.8, 1.2)
-    with pytest.raises(ValueError, match="three standard normals"):
+    with pytest.raises(ValueError, match="standard normals"):
         new_gust_state(MODERATE)
 
 
-def test_turbulence_fades_in_from_calm_air_and_out_to_exact_calm():
-    air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=kt(30.0), fade_in=2.0))
-    random = np.random.default_rng(5)
-    state = new_gust_state(air, random.standard_normal(3))
-    out = np.empty(3)
+@pytest.mark.parametrize("lateral", [False, True])
+def test_turbulence_fades_in_from_calm_air_and_out_to_exact_calm(lateral):
+    air = AirSpecification(turbulence=Turbulence(wind_at_20_ft=kt(30.0), fade_in=2.0), lateral=lateral)
+    random, width = np.random.default_rng(5), 6 if lateral else 3
+    state = new_gust_state(air, random.standard_normal(width))
+    acting = [GUST.u, GUST.w, *((GUST.v, GUST.p, GUST.r) if lateral else ())]
     winds = []
     for k in range(1501):
         if k == 1000:
-            set_turbulence(state, Turbulence(wind_at_20_ft=0.0, fade_in=1.0), random.standard_normal(3))
-        gust_step(TABLES, state, 40.0, 100.0, 0.0, k * DT, DT if k else 0.0, random.standard_normal(3), out)
+            set_turbulence(state, Turbulence(wind_at_20_ft=0.0, fade_in=1.0), random.standard_normal(width))
+        gust_step(TABLES, state, 40.0, 100.0, LEVEL, k * DT, DT if k else 0.0, random.standard_normal(width))
         winds.append(state[dryden.TURBULENCE.wind])
         if k == 0 or k > 1250:
-            assert (out == 0.0).all()
+            assert (state[GUST.u : GUST.busy] == 0.0).all()
         elif k < 1000:
-            assert (out[:2] != 0.0).all()
+            assert (state[acting] != 0.0).all()
     assert winds[250] == pytest.approx(kt(15.0))
     assert winds[500] == pytest.approx(kt(30.0))
     assert winds[1000] == pytest.approx(kt(30.0), abs=kt(0.13))

@@ -9,7 +9,7 @@ import pytest
 
 from rtsim.aircraft.points import Condition
 from rtsim.aircraft.profile import xv15_profile
-from rtsim.aircraft.variables import INPUT, OUTPUT, OUTPUTS, STATE, STATES
+from rtsim.aircraft.variables import ALL_INPUTS, ALL_OUTPUTS, ALL_STATES, INPUT, OUTPUT, STATE, whole
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError
@@ -37,10 +37,11 @@ class Flight:
         trim = aircraft.trim(Condition(airspeed=kt(airspeed), nacelle_angle=deg(nacelle)))
         assert trim.converged
         self.tables = aircraft.tables if tables is None else tables
-        self.x, self.u, self.nacelle = trim.x.copy(), trim.u.copy(), deg(nacelle)
+        self.x, self.u = whole(trim.x, ALL_STATES), whole(trim.u, ALL_INPUTS)
+        self.nacelle = deg(nacelle)
         self.faults, self.state = fault_tables(faults), new_fault_state()
         self.actuator = new_actuator_state(self.nacelle)
-        self.work = np.zeros(nonlinear.WORK_COUNT + 6 * len(STATES))
+        self.work = np.zeros(nonlinear.WORK_COUNT + nonlinear.STEP_SIZE)
         self.path = np.array([[self.nacelle, 0.0, 0.0]] * 3)
         self.time = 0.0
         self.frame = 0
@@ -48,7 +49,7 @@ class Flight:
 
     @property
     def power(self):
-        y, xdot = np.zeros(len(OUTPUTS)), np.zeros(len(STATES))
+        y, xdot = np.zeros(len(ALL_OUTPUTS)), np.zeros(len(ALL_STATES))
         nonlinear.outputs(self.tables, self.x, self.u, self.nacelle, y, xdot, self.work)
         return y[OUTPUT.power]
 
@@ -192,7 +193,7 @@ def test_a_jam_stops_the_nacelles_within_a_second_and_without_turning_back():
     fault = Fault(kind="nacelle-jammed", start=1.0, end=3.0)
     tables, state = fault_tables([fault]), new_fault_state()
     nacelle = new_actuator_state(deg(80.0))
-    x = np.zeros(len(STATES))
+    x = np.zeros(len(ALL_STATES))
     angles, rates, ok = [], [], []
     for k in range(1250):
         kernels.fault_update(tables, state, k * DT, x, nacelle, NACELLE.frequency, 0.0)
@@ -217,7 +218,7 @@ def test_slow_nacelles_keep_the_sign_and_small_rates():
     state = new_fault_state()
     assert kernels.fault_nacelle_rate(state, deg(-12.0)) == deg(-12.0)
     tables = fault_tables([Fault(kind="nacelle-slow", start=0.0, rate=deg(1.0))])
-    kernels.fault_update(tables, state, 0.0, np.zeros(len(STATES)), np.zeros(3), 3.0, 0.0)
+    kernels.fault_update(tables, state, 0.0, np.zeros(len(ALL_STATES)), np.zeros(3), 3.0, 0.0)
     rates = [kernels.fault_nacelle_rate(state, deg(rate)) for rate in (-12.0, -0.5, 0.0, 0.5, 12.0)]
     assert rates == pytest.approx([deg(rate) for rate in (-1.0, -0.5, 0.0, 0.5, 1.0)])
     assert kernels.fault_nacelle_ok(state)
@@ -229,7 +230,7 @@ def test_the_airspeed_indication_is_biased_or_stands_still():
         Fault(kind="airspeed-frozen", start=2.0, end=3.0),
     ]
     tables, state = fault_tables(faults), new_fault_state()
-    x, nacelle = np.zeros(len(STATES)), np.zeros(3)
+    x, nacelle = np.zeros(len(ALL_STATES)), np.zeros(3)
     shown = []
     for second in range(6):
         true = 40.0 + second
@@ -306,7 +307,7 @@ def test_the_schedule_is_what_the_event_log_says():
 
 
 def test_the_mask_names_every_failure():
-    x, nacelle = np.zeros(len(STATES)), np.zeros(3)
+    x, nacelle = np.zeros(len(ALL_STATES)), np.zeros(3)
     kinds = [
         ({"kind": "nacelle-jammed"}, kernels.MASK_JAMMED),
         ({"kind": "nacelle-slow", "rate": 0.1}, kernels.MASK_NACELLE_SLOW),

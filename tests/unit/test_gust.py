@@ -18,13 +18,17 @@ DT = 0.004
 NO_NORMALS = np.zeros(0)
 
 
-def fly(air, *, seconds, speed=50.0, pitch=0.0):
+SHOWN = [getattr(kernels.GUST, name) for name in ("u", "w", "q", "ahead", "below", "v", "p", "r", "right")]
+LEVEL = (0.0, 0.0)
+
+
+def fly(air, *, seconds, speed=50.0, pitch=0.0, bank=0.0):
+    """Columns u, w, q, ahead, below, v, p, r, right over time."""
     tables, state = gust_tables(air), new_gust_state(air)
-    out = np.empty(3)
     history = []
     for k in range(round(seconds / DT) + 1):
-        kernels.gust_step(tables, state, speed, 100.0, pitch, k * DT, DT if k else 0.0, NO_NORMALS, out)
-        history.append((*out, state[kernels.GUST.ahead], state[kernels.GUST.below]))
+        kernels.gust_step(tables, state, speed, 100.0, (pitch, bank), k * DT, DT if k else 0.0, NO_NORMALS)
+        history.append(state[SHOWN])
     return np.array(history), state
 
 
@@ -83,7 +87,7 @@ def test_earth_gusts_turn_with_the_pitch_attitude():
     pitch = deg(30.0)
     air = AirSpecification(gusts=(Gust(start=0.0, ahead=2.0, below=6.0, duration=0.0, shape="ramp"),))
     history, _ = fly(air, seconds=0.01, pitch=pitch)
-    gust_u, gust_w, _, ahead, below = history[-1]
+    gust_u, gust_w, _, ahead, below = history[-1, :5]
     assert (ahead, below) == pytest.approx((2.0, 6.0))
     assert gust_u == pytest.approx(2.0 * math.cos(pitch) - 6.0 * math.sin(pitch))
     assert gust_w == pytest.approx(2.0 * math.sin(pitch) + 6.0 * math.cos(pitch))
@@ -95,7 +99,7 @@ def test_body_gusts_stay_with_the_body():
     pitch = deg(-20.0)
     air = AirSpecification(gusts=(Gust(start=0.0, ahead=2.0, below=6.0, duration=0.0, shape="ramp", axes="body"),))
     history, _ = fly(air, seconds=0.01, pitch=pitch)
-    gust_u, gust_w, _, ahead, below = history[-1]
+    gust_u, gust_w, _, ahead, below = history[-1, :5]
     assert (gust_u, gust_w) == pytest.approx((2.0, 6.0))
     assert ahead == pytest.approx(2.0 * math.cos(pitch) + 6.0 * math.sin(pitch))
     assert below == pytest.approx(6.0 * math.cos(pitch) - 2.0 * math.sin(pitch))
@@ -119,18 +123,39 @@ def test_no_gust_is_exactly_no_gust(air):
 def test_busy_says_when_a_frame_may_leave_the_gusts_out():
     air = AirSpecification(gusts=(Gust(start=0.5, ahead=1.0, duration=0.5),))
     assert new_gust_state(AirSpecification())[kernels.GUST.busy] == 0.0
-    tables, state, out = gust_tables(air), new_gust_state(air), np.empty(3)
+    tables, state = gust_tables(air), new_gust_state(air)
     busy = [state[kernels.GUST.busy]]
     for time in (0.0, 0.6, 1.1, 1.2):
-        kernels.gust_step(tables, state, 50.0, 100.0, 0.0, time, DT, NO_NORMALS, out)
+        kernels.gust_step(tables, state, 50.0, 100.0, LEVEL, time, DT, NO_NORMALS)
         busy.append(state[kernels.GUST.busy])
     assert busy == [1.0, 1.0, 1.0, 1.0, 0.0]
-    assert (out == 0.0).all()
+    assert (state[SHOWN] == 0.0).all()
     add_gust(state, Gust(start=0.0, ahead=1.0, duration=0.1))
     assert state[kernels.GUST.busy] == 1.0
     calm = new_gust_state(AirSpecification())
     set_turbulence(calm, Turbulence.of_severity("light"), np.zeros(3))
     assert calm[kernels.GUST.busy] == 1.0
+
+
+def test_a_gust_from_the_side_is_felt_along_body_y_and_banked_along_z_too():
+    """Air from the right adds to v; in a right bank the belly meets it: w decreases."""
+    side = Gust(start=0.0, lateral=5.0, duration=0.0, shape="ramp")
+    level, _ = fly(AirSpecification(gusts=(side,)), seconds=0.1, pitch=0.3)
+    assert level[-1] == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 5.0])
+    assert (level[:, :5] == 0.0).all()
+    banked, _ = fly(AirSpecification(gusts=(side,)), seconds=0.1, pitch=0.3, bank=deg(30.0))
+    assert banked[-1, [5, 1]] == pytest.approx([5.0 * math.cos(deg(30.0)), -2.5])
+    along_y = Gust(start=0.0, lateral=5.0, duration=0.0, shape="ramp", axes="body")
+    body, _ = fly(AirSpecification(gusts=(along_y,)), seconds=0.1, bank=deg(30.0))
+    assert body[-1, [5, 8, 4]] == pytest.approx([5.0, 5.0 * math.cos(deg(30.0)), 2.5])
+
+
+def test_a_gust_in_the_plane_of_symmetry_is_not_felt_from_the_side():
+    """Not even as a negative zero: symmetric flights stay what they are to the last bit."""
+    history, _ = fly(
+        AirSpecification(gusts=(Gust(start=0.0, ahead=-3.0, below=2.0, duration=1.0),)), seconds=1.0, pitch=-0.2
+    )
+    assert history[:, 5:].tobytes() == np.zeros((len(history), 4)).tobytes()
 
 
 def test_gusts_add_up():
@@ -144,11 +169,10 @@ def test_gusts_add_up():
 def test_a_live_gust_is_felt_from_the_next_step():
     air = AirSpecification()
     tables, state = gust_tables(air), new_gust_state(air)
-    out = np.empty(3)
-    kernels.gust_step(tables, state, 50.0, 100.0, 0.0, 1.0, DT, NO_NORMALS, out)
+    kernels.gust_step(tables, state, 50.0, 100.0, LEVEL, 1.0, DT, NO_NORMALS)
     add_gust(state, Gust(start=1.0, ahead=4.0, duration=0.0, shape="ramp"))
-    kernels.gust_step(tables, state, 50.0, 100.0, 0.0, 1.0 + DT, DT, NO_NORMALS, out)
-    assert out[0] == 4.0
+    kernels.gust_step(tables, state, 50.0, 100.0, LEVEL, 1.0 + DT, DT, NO_NORMALS)
+    assert state[kernels.GUST.u] == 4.0
 
 
 def test_room_for_live_gusts_is_finite_and_given_back():
@@ -159,8 +183,7 @@ def test_room_for_live_gusts_is_finite_and_given_back():
         add_gust(state, pulse)
     with pytest.raises(InputError, match="no room for another gust"):
         add_gust(state, pulse)
-    out = np.empty(3)
-    kernels.gust_step(tables, state, 50.0, 100.0, 0.0, 0.2, DT, NO_NORMALS, out)
+    kernels.gust_step(tables, state, 50.0, 100.0, LEVEL, 0.2, DT, NO_NORMALS)
     add_gust(state, pulse)
 
 

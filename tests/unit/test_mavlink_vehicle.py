@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import ROW_WIDTH
-from telemetry.mavlink.config import MavlinkConfig
+from telemetry.mavlink.config import HomePosition, MavlinkConfig
 from telemetry.mavlink.exchange import ALIVE, Exchange, Feedback, Request
 from telemetry.mavlink.peers import MOST_PEERS
 from telemetry.mavlink.vehicle import Vehicle
@@ -29,7 +29,10 @@ FLIGHT = {
     "pitch_deg": 4.0,
     "pitch_rate_deg_s": -2.0,
     "climb_rate_m_s": 1.5,
-    "distance_m": 1000.0,
+    "heading_deg": 350.0,
+    "track_deg": 350.0,
+    "north_m": 984.8,
+    "east_m": -173.6,
     "lever": 0.55,
     "stick": 0.12,
     "margin_low_kt": 70.0,
@@ -169,9 +172,9 @@ def test_default_rates(bench):
         counts[message.get_type()] = counts.get(message.get_type(), 0) + 1
     expected = {
         "HEARTBEAT": 10, "SYS_STATUS": 20, "EXTENDED_SYS_STATE": 20, "ATTITUDE": 500, "ATTITUDE_QUATERNION": 500,
-        "LOCAL_POSITION_NED": 200, "GLOBAL_POSITION_INT": 100, "VFR_HUD": 100, "NAMED_VALUE_FLOAT": 800,
+        "LOCAL_POSITION_NED": 200, "GLOBAL_POSITION_INT": 100, "VFR_HUD": 100, "NAMED_VALUE_FLOAT": 1000,
         "DEBUG_FLOAT_ARRAY": 100, "RC_CHANNELS": 100, "SERVO_OUTPUT_RAW": 20, "ALTITUDE": 20, "GPS_RAW_INT": 20,
-        "BATTERY_STATUS": 10, "HOME_POSITION": 5, "SYSTEM_TIME": 10, "CURRENT_MODE": 10,
+        "BATTERY_STATUS": 10, "WIND_COV": 10, "HOME_POSITION": 5, "SYSTEM_TIME": 10, "CURRENT_MODE": 10,
     }  # fmt: skip
     for name, count in expected.items():
         assert counts[name] == pytest.approx(count, rel=0.02, abs=2), name
@@ -184,7 +187,7 @@ def test_units_and_signs_agree_across_messages(bench):
     attitude, quaternion = by_name["ATTITUDE"], by_name["ATTITUDE_QUATERNION"]
     assert attitude.pitch == pytest.approx(math.radians(4.0))
     assert attitude.pitchspeed == pytest.approx(math.radians(-2.0))
-    assert attitude.roll == attitude.rollspeed == attitude.yawspeed == 0.0
+    assert attitude.roll == attitude.rollspeed == attitude.yawspeed == 0.0  # of a flight straight ahead
     q1, q2, q3, q4 = quaternion.q1, quaternion.q2, quaternion.q3, quaternion.q4
     assert math.asin(2.0 * (q1 * q3 - q4 * q2)) == pytest.approx(attitude.pitch, abs=1e-6)
     yaw = math.atan2(2.0 * (q1 * q4 + q2 * q3), 1.0 - 2.0 * (q3**2 + q4**2))
@@ -193,7 +196,7 @@ def test_units_and_signs_agree_across_messages(bench):
     assert attitude.time_boot_ms == quaternion.time_boot_ms
     local, glob, hud = by_name["LOCAL_POSITION_NED"], by_name["GLOBAL_POSITION_INT"], by_name["VFR_HUD"]
     assert (local.z, local.vz) == (-123.0, -1.5)
-    assert math.hypot(local.x, local.y) == pytest.approx(1000.0, rel=1e-5)
+    assert (local.x, local.y) == pytest.approx((984.8, -173.6))
     assert math.hypot(local.vx, local.vy) == pytest.approx(85.0 * 0.514444, rel=1e-5)
     assert math.atan2(local.vy, local.vx) == pytest.approx(attitude.yaw, abs=1e-5)
     assert (glob.relative_alt, glob.alt, glob.vz) == (123_000, 123_000, -150)
@@ -220,6 +223,76 @@ def test_units_and_signs_agree_across_messages(bench):
     assert array.data[:5] == pytest.approx([75.0, 74.0, 70.0, 60.0, 3.0])
     assert array.data[6:8] == pytest.approx([100.0, 50.0])
     assert array.data[9:11] == pytest.approx([0.4, 3.0])
+
+
+TURN = {
+    "bank_deg": -30.0, "pitch_deg": 10.0, "heading_deg": 200.0, "roll_rate_deg_s": 4.0, "yaw_rate_deg_s": -8.0,
+    "track_deg": 215.0, "ground_speed_kt": 60.0, "north_m": -300.0, "east_m": 150.0, "sideslip_deg": -6.0,
+    "lateral_acceleration": 0.05, "wind_north_m_s": -3.0, "wind_east_m_s": 4.0, "flapping_left_deg": 2.0,
+    "flapping_right_deg": 4.0, "mast_torque_left_inlb": 130_000.0, "mast_torque_right_inlb": 65_000.0,
+    "collective_75_deg": 20.0, "differential_collective_deg": 2.0, "cyclic_deg": -1.0, "differential_cyclic_deg": 0.5,
+    "aileron_deg": -10.0, "rudder_deg": 5.0,
+}  # fmt: skip
+
+
+def test_a_turn_is_seen_in_attitude_position_and_wind(bench):
+    """Left turn to the south-west, drifting: roll negative, course by the track, place by north and east."""
+    bench.signals |= TURN
+    bench.fly(2.1)
+    by_name = {message.get_type(): message for message in bench.taken()}
+    attitude, quaternion = by_name["ATTITUDE"], by_name["ATTITUDE_QUATERNION"]
+    angles = [math.degrees(angle) for angle in (attitude.roll, attitude.pitch, attitude.yaw)]
+    assert angles == pytest.approx([-30.0, 10.0, -160.0], abs=1e-4)
+    rates = [math.degrees(rate) for rate in (attitude.rollspeed, attitude.pitchspeed, attitude.yawspeed)]
+    assert rates == pytest.approx([4.0, -2.0, -8.0], abs=1e-4)
+    w, x, y, z = quaternion.q1, quaternion.q2, quaternion.q3, quaternion.q4
+    assert w * w + x * x + y * y + z * z == pytest.approx(1.0, abs=1e-6)
+    assert math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) == pytest.approx(attitude.roll, abs=1e-6)
+    assert math.asin(2.0 * (w * y - z * x)) == pytest.approx(attitude.pitch, abs=1e-6)
+    assert math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) == pytest.approx(attitude.yaw, abs=1e-6)
+    local, glob = by_name["LOCAL_POSITION_NED"], by_name["GLOBAL_POSITION_INT"]
+    assert (local.x, local.y) == (-300.0, 150.0)
+    assert math.degrees(math.atan2(local.vy, local.vx)) % 360.0 == pytest.approx(215.0, abs=1e-3)
+    assert math.hypot(local.vx, local.vy) == pytest.approx(60.0 * 0.514444, rel=1e-5)
+    assert (glob.lat - 374_080_000) * 1e-7 * 111_195 == pytest.approx(-300.0, abs=0.1)
+    east = (glob.lon + 1_211_090_000) * 1e-7 * 111_195 * math.cos(math.radians(37.408))
+    assert east == pytest.approx(150.0, abs=0.1)
+    assert (glob.hdg, by_name["VFR_HUD"].heading, by_name["GPS_RAW_INT"].cog) == (20_000, 200, 21_500)
+    wind = by_name["WIND_COV"]
+    assert (wind.wind_x, wind.wind_y, wind.wind_z, wind.wind_alt) == (-3.0, 4.0, 0.0, 123.0)
+
+
+def test_left_and_right_are_mean_less_and_plus_half_the_difference(bench):
+    bench.signals |= TURN
+    bench.fly(2.1)
+    taken = bench.taken()
+    by_name = {message.get_type(): message for message in taken}
+    servo = by_name["SERVO_OUTPUT_RAW"]
+    assert (servo.servo3_raw, servo.servo8_raw, servo.servo9_raw) == (1400, 1360, 1440)
+    assert (servo.servo2_raw, servo.servo10_raw, servo.servo11_raw) == (1450, 1425, 1475)
+    assert (servo.servo6_raw, servo.servo7_raw, servo.servo12_raw) == (1250, 1625, 0)
+    values = {message.name: message.value for message in taken if message.get_type() == "NAMED_VALUE_FLOAT"}
+    assert (values["slip_deg"], values["ball_g"]) == pytest.approx((-6.0, 0.05))
+    assert values["trq_pct"] == pytest.approx(100.0)  # of the left mast
+    assert by_name["DEBUG_FLOAT_ARRAY"].data[16:22] == pytest.approx([-6.0, 0.05, 2.0, 4.0, 100.0, 50.0])
+
+
+def test_a_heading_just_west_of_north_is_not_sent_as_a_whole_turn(bench):
+    bench.signals |= {"heading_deg": 359.999}
+    bench.fly(0.2)
+    assert bench.taken("GLOBAL_POSITION_INT")[-1].hdg == 0
+    bench.signals |= {"heading_deg": 359.6}
+    bench.fly(0.2)
+    assert bench.taken("VFR_HUD")[-1].heading == 0
+
+
+def test_home_is_where_and_how_the_flight_began():
+    bench = Bench(home=HomePosition(latitude_deg=47.0, longitude_deg=8.0, heading_deg=90.0))
+    bench.signals |= TURN
+    bench.fly(2.1)
+    home = bench.taken("HOME_POSITION")[-1]
+    assert (home.latitude, home.longitude) == (470_000_000, 80_000_000)
+    assert home.q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)])
 
 
 def test_named_values(bench):
@@ -1107,7 +1180,7 @@ def test_rates_are_for_stations_and_a_station_has_a_budget(bench):
     assert bench.command(511, 30.0, 4000.0, address=OTHER) == 1
     assert bench.command(511, 30.0, 4000.0, system=42) == 2
     bench.fly(1.0)
-    for number in (30, 31, 32, 33, 74, 251, 350, 65, 36, 141, 24, 147, 242, 2, 436, 1, 245):
+    for number in (30, 31, 32, 33, 74, 251, 350, 65, 36, 141, 24, 147, 242, 231, 2, 436, 1, 245):
         assert bench.command(511, float(number), 1.0) == 0
     bench.sent.clear()
     bench.vehicle.peers.by_address[GROUND].volume.take(bench.now, 90_000.0)

@@ -43,6 +43,7 @@ def part(rows: slice, columns: slice) -> Database:
         rotor_speed=DATABASE.rotor_speed[columns],
         flap=DATABASE.flap[rows, columns],
         pilot={},
+        lateral=None,
         **arrays,
     )
 

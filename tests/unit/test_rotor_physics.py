@@ -35,9 +35,14 @@ def twin():
     return module
 
 
+def whole(hub):
+    """The hub's motion with nothing sideways."""
+    return (*hub, *(0.0,) * (6 - len(hub)))
+
+
 def loads(hub=(0.0, 0.0, 0.0), flapping=STILL, inflow=INFLOW, pitch=(0.2, 0.0), rotor=ROTOR, air=AIR):
     out = np.zeros(kernels.LOAD_COUNT)
-    kernels.rotor_loads(rotor, air, hub, flapping, inflow, pitch, out)
+    kernels.rotor_loads(rotor, air, whole(hub), flapping, inflow, pitch, out)
     return out
 
 
@@ -47,8 +52,8 @@ def equilibrium(hub, pitch, rotor=ROTOR, air=AIR):
     def residual(z):
         flapping = (z[0], 0.0, z[1], 0.0, z[2], 0.0)
         found = loads(hub, flapping, tuple(z[3:]), pitch, rotor, air)
-        accelerations = kernels.flapping_accelerations(rotor, air.rotor_speed, (hub[2], 0.0), flapping, found)
-        return [*(np.array(accelerations) / 4e3), *kernels.inflow_rates(rotor, air, hub, tuple(z[3:]), found)]
+        accelerations = kernels.flapping_accelerations(rotor, air.rotor_speed, (hub[2], 0.0, 0.0, 0.0), flapping, found)
+        return [*(np.array(accelerations) / 4e3), *kernels.inflow_rates(rotor, air, whole(hub), tuple(z[3:]), found)]
 
     z, _, found, message = fsolve(residual, [0.05, 0.0, 0.0, 0.05, 0.0, 0.0], full_output=True, xtol=1e-13)
     assert found == 1, message
@@ -106,7 +111,7 @@ def test_flapping_equation_keeps_a_free_gyroscope_in_space():
     state = np.zeros(4)  # b1c, b1c', b1s, b1s'
 
     def rate(values, time):
-        mast = (0.3 * (1.0 - np.cos(2.0 * time)), 0.6 * np.sin(2.0 * time))
+        mast = (0.3 * (1.0 - np.cos(2.0 * time)), 0.6 * np.sin(2.0 * time), 0.0, 0.0)
         _, c, s = kernels.flapping_accelerations(vacuum, om, mast, (0.0, 0.0, *values), no_loads)
         return np.array([values[1], c, values[3], s])
 
@@ -143,7 +148,7 @@ def test_power_balance(hub, pitch):
     """
     reference = twin()
     found, flap, inflow = equilibrium(hub, pitch)
-    _, disc = reference.rotor_twin(ROTOR, AIR, hub, (flap[0], 0.0, flap[1], 0.0, flap[2], 0.0), inflow, pitch)
+    _, disc = reference.rotor_twin(ROTOR, AIR, whole(hub), (flap[0], 0.0, flap[1], 0.0, flap[2], 0.0), inflow, pitch)
     shaft = found[kernels.TORQUE] * AIR.rotor_speed
     propulsive = found[kernels.THRUST] * hub[1] + found[kernels.FORWARD_FORCE] * hub[0]
     assert disc.profile_power > 0.0

@@ -35,6 +35,8 @@ LARGEST_STEP = {SIDE.lateral_airspeed: kt(5.0), SIDE.sideslip: deg(3.0), SIDE.bo
 """Steps of the continuation, by what is asked for."""
 _SMALLEST_SHARE = 1.0 / 64.0
 CONTROLS = ("stick", "lateral_stick", "pedal")
+NEAR_STOP = 0.95
+"""A control this far out ends a branch that goes no further."""
 
 
 def steady_flight(condition: Condition) -> Steady:
@@ -131,7 +133,11 @@ def steady_point(tables: AircraftTables, flight: Steady, z: FloatArray, *, reach
     steady_residual(tables, flight, z, residual)
     worst = int(np.argmax(np.abs(residual)))
     unclosed = ""
-    if not reached or not abs(residual[worst]) < CONVERGED:
+    if not reached:
+        # The tables of rudder and cyclic end with the controls' travel: a branch that stops there stops for them.
+        near = [name for name in CONTROLS if abs(u[getattr(INPUT, name)]) > NEAR_STOP]
+        unclosed = near[0] if near else ALL_STATES[RESIDUAL_ROWS[worst]].name
+    elif not abs(residual[worst]) < CONVERGED:
         unclosed = ALL_STATES[RESIDUAL_ROWS[worst]].name
     else:
         unclosed = next((name for name in CONTROLS if abs(u[getattr(INPUT, name)]) > 1.0), "")
