@@ -240,6 +240,20 @@ def test_position_hold_stays_in_a_step_of_wind(plant: str, direction: float) -> 
     assert drifted["bank_retention"][-1] > 5.0
 
 
+@pytest.mark.parametrize("direction", [0.0, 120.0, 270.0])
+def test_position_hold_stops_a_drift_with_the_wind(direction: float) -> None:
+    """Let go in 12 kn of wind, the aircraft comes to rest over the ground within 60 m and stays where it is."""
+    programme = Programme.hold(airspeed=0.0, nacelle_angle=deg(90.0), altitude=100.0)
+    aids = (*PITCH, "position_hold", "heading_hold")
+    setup = FlightSetup(programme=programme).with_options(
+        pilot="external", aids=aids, wind=kt(12.0), wind_from=deg(direction)
+    )
+    place = fly(Simulation(setup), 50.0)[:, [STATE.north, STATE.east]]
+    assert 15.0 < np.hypot(*place[-1]) < 60.0
+    assert np.cos(deg(direction)) * place[-1, 0] + np.sin(deg(direction)) * place[-1, 1] < -15.0
+    np.testing.assert_allclose(place[-2500:], np.broadcast_to(place[-1], (2500, 2)), atol=0.7)
+
+
 def test_the_stick_moves_the_place_that_is_held() -> None:
     """A push lets it go, and the aircraft comes to rest elsewhere and stays."""
     flight = simulation(0, 90, "position_hold", "heading_hold")
