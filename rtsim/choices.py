@@ -14,7 +14,11 @@ CorridorName = Literal[ChartName, "model"]
 """The charts, and the boundaries that follow from a database's own trims."""
 PilotMode = Literal["mocm", "external", "hold"]
 """Who holds the sticks: the virtual pilot, somebody else (a person, a plug-in, a recording), or nobody."""
-AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias"]
+LateralAidName = Literal[
+    "roll_damping", "yaw_damping", "bank_retention", "heading_hold", "turn_coordination", "position_hold"
+]
+"""Aids that need to know what the aircraft does out of its plane of symmetry."""
+AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspeed_hold", "trim_bias", LateralAidName]
 """What acts between the pilot's hands and the control mixing."""
 SwitchName = Literal[AidName, "automatic_flaps", "governor", "automatic_rotor_speed"]
 """All that can be switched in flight: the aids, and what moves flaps and rotors whoever flies."""

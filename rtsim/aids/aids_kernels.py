@@ -7,7 +7,7 @@ accelerations wanted over accelerations the controls give (``design.py``), so on
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rtsim.aircraft.variables import STATE
 from rtsim.arrays import FloatArray
@@ -17,10 +17,11 @@ from rtsim.places import Places
 
 # Places in the switches; 1 on, 0 off.
 RATE_DAMPING, ATTITUDE_RETENTION, ALTITUDE_HOLD, AIRSPEED_HOLD, TRIM_BIAS = 0, 1, 2, 3, 4
-AID_COUNT = 5
+ROLL_DAMPING, YAW_DAMPING, BANK_RETENTION, HEADING_HOLD, TURN_COORDINATION, POSITION_HOLD = 5, 6, 7, 8, 9, 10
+AID_COUNT = 11
 """Aids that act on the controls; the switches of flaps and rotor drive follow."""
-AUTOMATIC_FLAPS, GOVERNOR, AUTOMATIC_ROTOR_SPEED = 5, 6, 7
-SWITCH_COUNT = 8
+AUTOMATIC_FLAPS, GOVERNOR, AUTOMATIC_ROTOR_SPEED = 11, 12, 13
+SWITCH_COUNT = 14
 MEMORY = Places(
     "pitch_reference",
     "altitude_reference",
@@ -33,9 +34,23 @@ MEMORY = Places(
     "lever_offset",
     "hands_lever",
     "lever_trim",
-    ("last_switches", AID_COUNT),
     "lateral_offset",  # what is left of the last hand-over; NaN: to be found in the coming frame
     "pedal_offset",
+    "bank_reference",
+    "heading_reference",
+    "heading_integral",  # pedal
+    "heading_held",  # 1 while the heading is held, 0 while it is the hands'
+    "north_reference",
+    "east_reference",
+    "north_integral",  # acceleration
+    "east_integral",
+    "last_north",
+    "last_east",
+    "quiet_time",  # since when the hands have left the place alone
+    "place_share",  # how much of bank and pitch is the place's: 0 while it is the hands', 1 while it is held
+    "place_bank",
+    "place_pitch",
+    ("last_switches", AID_COUNT),
 )
 """Places in the state."""
 MAP = Places(
@@ -94,10 +109,11 @@ class AidTables(NamedTuple):
 
 
 @inner_kernel
-def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) -> float:
+def scheduled(tables: Any, which: int, airspeed: float, nacelle: float) -> float:
     """Value of one map at a flight condition, bilinear and held outside the grid.
 
     Args:
+        tables: Has the axes ``airspeed`` [m/s] and ``nacelle`` [rad], and ``maps``.
         which: Number of the map.
     """
     i, s = cell(tables.airspeed, airspeed)
@@ -109,15 +125,26 @@ def scheduled(tables: AidTables, which: int, airspeed: float, nacelle: float) ->
 
 
 @inner_kernel
-def _beyond(value: float, dead_zone: float) -> float:
-    """The part of a deflection beyond the dead zone, rescaled to full travel."""
+def beyond(value: float, dead_zone: float) -> float:
+    """The part of a deflection beyond the dead zone, rescaled to full travel.
+
+    Args:
+        value: Deflection.
+        dead_zone: Where it begins to count.
+    """
     if abs(value) <= dead_zone:
         return 0.0
     return math.copysign((abs(value) - dead_zone) / (1.0 - dead_zone), value)
 
 
 @inner_kernel
-def _limited(value: float, limit: float) -> float:
+def limited(value: float, limit: float) -> float:
+    """A value no larger than a limit, either way.
+
+    Args:
+        value: Anything.
+        limit: The limit of its magnitude.
+    """
     return min(max(value, -limit), limit)
 
 
@@ -134,8 +161,8 @@ def _path_error(state: FloatArray, x: FloatArray) -> float:
     """Change of pitch that altitude hold asks for in airplane mode, where the path follows pitch [rad]."""
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     airspeed, climb = x[STATE.u] * ct + x[STATE.w] * st, x[STATE.u] * st - x[STATE.w] * ct
-    wanted = _limited(CLIMB_PER_HEIGHT * (state[MEMORY.altitude_reference] - x[STATE.altitude]), FASTEST_CLIMB)
-    return _limited((wanted - climb) / max(abs(airspeed), 20.0), 0.12)
+    wanted = limited(CLIMB_PER_HEIGHT * (state[MEMORY.altitude_reference] - x[STATE.altitude]), FASTEST_CLIMB)
+    return limited((wanted - climb) / max(abs(airspeed), 20.0), 0.12)
 
 
 @inner_kernel
@@ -187,13 +214,13 @@ def _terms(
         held = state[MEMORY.lever_reference] + scheduled(tables, MAP.lever, at, nacelle) - state[MEMORY.lever_trim]
         if switches[ALTITUDE_HOLD] != 0.0:
             w = tables.altitude_frequency
-            wanted = _limited(w * w * height_error - 1.6 * w * climb, 2.5) + state[MEMORY.altitude_integral]
+            wanted = limited(w * w * height_error - 1.6 * w * climb, 2.5) + state[MEMORY.altitude_integral]
             lift = max(scheduled(tables, MAP.lever_lift, at, nacelle), 4.0)
             helicopter_lever = held + wanted / lift
             pitch_wanted += (1.0 - share) * _path_error(state, x)
         if switches[AIRSPEED_HOLD] != 0.0:
             wanted = tables.airspeed_frequency * speed_error + state[MEMORY.airspeed_integral]
-            wanted = _limited(wanted, 1.5)
+            wanted = limited(wanted, 1.5)
             pitch_wanted -= share * wanted / 9.81
             thrust = max(scheduled(tables, MAP.lever_thrust, at, nacelle), 10.0)
             airplane_lever = held + wanted / thrust
@@ -207,18 +234,21 @@ def _terms(
         for k in range(3):
             if flaps[k] != 0.0:
                 stick += scheduled(tables, MAP.stick_flaps + k, at, nacelle) * flaps[k]
+    if switches[POSITION_HOLD] != 0.0:
+        pitch_wanted += state[MEMORY.place_share] * (state[MEMORY.place_pitch] - pitch_wanted)
     attitude = switches[ATTITUDE_RETENTION] + switches[ALTITUDE_HOLD] * (1.0 - share) + switches[AIRSPEED_HOLD] * share
+    attitude += switches[POSITION_HOLD]
     added = 0.0
     if attitude > 0.0:
         w = tables.attitude_frequency
-        rate_wanted = -tables.rate_command * _beyond(hands[0], tables.dead_zone)
+        rate_wanted = -tables.rate_command * beyond(hands[0], tables.dead_zone)
         damping = max(2.0 * tables.attitude_damping * w + natural, 0.0)
         added = (w * w * (pitch_wanted - pitch) + damping * (rate_wanted - q)) / sensitivity
         # The hands command the rate through the reference; their direct part would act twice.
         stick -= hands[0]
     elif switches[RATE_DAMPING] != 0.0:
         added = -max(tables.damping + natural, 0.0) * q / sensitivity
-    return stick + _limited(added, tables.authority), lever, height_error, speed_error
+    return stick + limited(added, tables.authority), lever, height_error, speed_error
 
 
 @inner_kernel
@@ -289,7 +319,7 @@ def aids_step(
     stick, lever, height_error, speed_error = _terms(tables, state, switches, x, nacelle, hands, flaps)
     stick += state[MEMORY.stick_offset]
     lever += state[MEMORY.lever_offset]
-    acting[0] = _limited(stick, 1.0)
+    acting[0] = limited(stick, 1.0)
     acting[1] = min(max(lever, 0.0), 1.0)
     fade = dt / tables.fade_time
     state[MEMORY.stick_offset] -= fade * state[MEMORY.stick_offset]
@@ -297,21 +327,21 @@ def aids_step(
 
     start, end = tables.blend
     helicopter = nacelle > 0.5 * (start + end)
-    pushed = _beyond(hands[0], tables.dead_zone)
+    pushed = beyond(hands[0], tables.dead_zone)
     if not helicopter and switches[AIRSPEED_HOLD] == 0.0:
         state[MEMORY.hands_lever] = hands[1]  # the throttle of an airplane; where it stands is no wish to climb later
-    moved = _beyond(hands[1] - state[MEMORY.hands_lever], 2.0 * tables.dead_zone)
+    moved = beyond(hands[1] - state[MEMORY.hands_lever], 2.0 * tables.dead_zone)
     if switches[AIRSPEED_HOLD] != 0.0:
         state[MEMORY.airspeed_reference] += dt * 1.5 * (pushed if helicopter else moved)
         free = abs(speed_error) < 5.0
         if free:
             gain = tables.airspeed_frequency / tables.integral_time
-            state[MEMORY.airspeed_integral] = _limited(state[MEMORY.airspeed_integral] + dt * gain * speed_error, 1.5)
+            state[MEMORY.airspeed_integral] = limited(state[MEMORY.airspeed_integral] + dt * gain * speed_error, 1.5)
     if switches[ALTITUDE_HOLD] != 0.0:
         state[MEMORY.altitude_reference] += dt * 5.0 * (moved if helicopter else -pushed)
         if abs(height_error) < 20.0:
             gain = tables.altitude_frequency**2 / tables.integral_time
-            state[MEMORY.altitude_integral] = _limited(state[MEMORY.altitude_integral] + dt * gain * height_error, 4.0)
+            state[MEMORY.altitude_integral] = limited(state[MEMORY.altitude_integral] + dt * gain * height_error, 4.0)
         # The attitude that keeps the height changes with speed, flaps and nacelles.
         state[MEMORY.pitch_reference] += dt / PATH_TIME * (1.0 - _share(tables, nacelle)) * _path_error(state, x)
     held_by_hold = (switches[AIRSPEED_HOLD] != 0.0 and helicopter) or (
@@ -321,4 +351,4 @@ def aids_step(
         state[MEMORY.pitch_reference] -= dt * tables.rate_command * pushed
     # The reference never runs away from an attitude the aircraft cannot follow.
     window = 8.0 * math.pi / 180.0
-    state[MEMORY.pitch_reference] = x[STATE.pitch] + _limited(state[MEMORY.pitch_reference] - x[STATE.pitch], window)
+    state[MEMORY.pitch_reference] = x[STATE.pitch] + limited(state[MEMORY.pitch_reference] - x[STATE.pitch], window)

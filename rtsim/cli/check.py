@@ -223,6 +223,7 @@ def profile_problems(database: Database) -> list[InputError]:
         The first number of each part that is missing or out of range.
     """
     from rtsim.aids.design import design_aids
+    from rtsim.aids.lateral_design import design_lateral_aids
     from rtsim.aircraft.controls import control_tables
     from rtsim.atmosphere.air import gust_tables
     from rtsim.atmosphere.specification import CALM
@@ -247,6 +248,7 @@ def profile_problems(database: Database) -> list[InputError]:
     reads += [functools.partial(load_corridor, name, profile) for name in get_args(ChartName)]
     reads += [functools.partial(gust_tables, CALM, profile), functools.partial(fault_tables, (), profile)]
     reads += [functools.partial(conversion_end_kt, database), functools.partial(design_aids, database)]
+    reads += [functools.partial(design_lateral_aids, database)]
     reads += [functools.partial(law_tables, "full", database, dt=0.004)]
     reads += [
         functools.partial(load_pilot_tables, database, name) for name in get_args(OuterLoop) if name in database.pilot

@@ -139,15 +139,18 @@ def aid(flight: Flight) -> None:
     hands, aided = scratch.command[STATION.hands], scratch.command[STATION.aided]
     hands[CHANNEL.stick] = min(max(hands[CHANNEL.stick], -1.0), 1.0)
     hands[CHANNEL.lever] = min(max(hands[CHANNEL.lever], 0.0), 1.0)
-    _take_over(flight, CHANNEL.lateral_stick, INPUT.lateral_stick, MEMORY.lateral_offset)
-    _take_over(flight, CHANNEL.pedal, INPUT.pedal, MEMORY.pedal_offset)
+    hands[CHANNEL.lateral_stick] = min(max(hands[CHANNEL.lateral_stick], -1.0), 1.0)
+    hands[CHANNEL.pedal] = min(max(hands[CHANNEL.pedal], -1.0), 1.0)
     if state.clock[CLOCK.mode] != MODE.external:
         # Held controls are what acted last, aids included: a second helping would run them away.
         aided[CHANNEL.stick], aided[CHANNEL.lever] = hands[CHANNEL.stick], hands[CHANNEL.lever]
+        _take_over(flight, CHANNEL.lateral_stick, INPUT.lateral_stick, MEMORY.lateral_offset)
+        _take_over(flight, CHANNEL.pedal, INPUT.pedal, MEMORY.pedal_offset)
         # Whoever takes over later finds the aids to be engaged anew.
         state.aids[MEMORY.last_switches] = -1.0
     else:
         aided[CHANNEL.stick], aided[CHANNEL.lever] = state.u[INPUT.stick], state.u[INPUT.lever]
+        aided[CHANNEL.lateral_stick], aided[CHANNEL.pedal] = state.u[INPUT.lateral_stick], state.u[INPUT.pedal]
         call_at(flight.parts[PART.aids], flight)
     if tables.automatic.active != 0:
         aided[CHANNEL.nacelle_rate] = scratch.target[TARGET.nacelle_rate]
@@ -159,8 +162,7 @@ def aid(flight: Flight) -> None:
 def _take_over(flight: Flight, channel: int, place: int, memory: int) -> None:
     """Pass a lateral channel on; what acted when its pilot took over fades into what this pilot gives."""
     state, command = flight.state, flight.scratch.command
-    given = min(max(command[STATION.hands, channel], -1.0), 1.0)
-    command[STATION.hands, channel] = given
+    given = command[STATION.hands, channel]
     if math.isnan(state.aids[memory]):
         state.aids[memory] = state.u[place] - given
     offset = state.aids[memory]
@@ -315,7 +317,7 @@ def move_plant(flight: Flight) -> None:
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     x, u, dt = state.x, state.u, tables.dt
-    acting, heading = scratch.command[STATION.acting], x[STATE.heading]
+    acting = scratch.command[STATION.acting]
     rate = acting[CHANNEL.nacelle_rate]
     nacelle_path(tables.nacelle, state.nacelle, rate, dt, scratch.path)
     u[INPUT.stick] = acting[CHANNEL.stick]
@@ -329,7 +331,7 @@ def move_plant(flight: Flight) -> None:
         for row in range(3):
             scratch.path[row, 0] = scratch.known[KNOWN.place]
     _turn_systems(flight)
-    heading = x[STATE.heading]
+    heading = x[STATE.heading]  # not that of the row, to a whole turn: flights mirror to the last bit
     state.clock[CLOCK.flags] = call_at(
         flight.parts[PART.step], tables.plant.aircraft, x, u, scratch.path, dt, scratch.work
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from rtsim.aids.aids_kernels import AidTables
+from rtsim.aids.lateral_aids_kernels import LateralAidTables
 from rtsim.aircraft.xv15.tables import Configuration, ControlTables
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.atmosphere.gust_kernels import GustTables
@@ -144,6 +145,8 @@ class SimulationTables(NamedTuple):
     aids: AidTables
     """Schedules of the pilot aids; they act on hands and plug-ins, not on the MOCM, which is designed for the
     bare aircraft, nor on controls that are held."""
+    lateral_aids: LateralAidTables
+    """The same for the aids out of the plane of symmetry."""
     gusts: GustTables
     """Parameters of gusts and turbulence."""
     faults: FaultTables

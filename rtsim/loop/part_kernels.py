@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from rtsim.aids.aids_kernels import GOVERNOR, aids_airspeed, aids_step
+from rtsim.aids.lateral_aids_kernels import lateral_aids_step
 from rtsim.aircraft.variables import OUTPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
 from rtsim.arrays import FloatArray
@@ -130,6 +131,12 @@ def act_aids(flight: Flight) -> float:
     expected = flap_schedule(tables.plant.controls, airspeed, angle)
     flap_parts(tables.flaps, flap_now(state.flaps, scratch.known[KNOWN.flap]), expected, scratch.flaps)
     place = scratch.known[KNOWN.place]
+    x, bank = state.x, state.x[STATE.bank]
+    if bank != 0.0:  # the pitch rate that belongs to the turn is none to be damped
+        scratch.seen[STATE.q] = x[STATE.q] - x[STATE.r] * math.sin(bank) / max(math.cos(bank), 0.5)
+    lateral_aids_step(
+        tables.lateral_aids, state.aids, state.switches, scratch.seen, place, airspeed, hands, aided, tables.dt
+    )
     aids_step(
         tables.aids, state.aids, state.switches, scratch.seen, place, hands, scratch.flaps, aided, tables.dt
     )  # fmt: skip

@@ -12,6 +12,7 @@ import numpy as np
 
 from rtsim.aids.aids_kernels import AUTOMATIC_FLAPS, AUTOMATIC_ROTOR_SPEED, GOVERNOR, MEMORY
 from rtsim.aids.design import design_aids, switches_of
+from rtsim.aids.lateral_design import LATERAL_AIDS, design_lateral_aids, knows_lateral_aids
 from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.controls import control_tables
 from rtsim.aircraft.points import Condition
@@ -147,6 +148,8 @@ class Parts:
     """Hash of the aircraft."""
     needed_aids: tuple[SwitchName, ...]
     """Aids that cannot be switched off: the database does not say what the aircraft does without them."""
+    lateral_aids: bool
+    """The aircraft moves out of its plane of symmetry, and the database says how: the lateral aids have gains."""
     start_x: FloatArray = field(repr=False)
     """Trimmed state at the start."""
     start_u: FloatArray = field(repr=False)
@@ -289,6 +292,10 @@ def build_parts(setup: FlightSetup) -> Parts:
     x[STATE.altitude], x[STATE.heading] = altitude, options.heading
     dt, corridor = 1.0 / options.rate_hz, options.corridor_name
     pilot = load_pilot_tables(database, options.outer_loop, dt=dt)
+    lateral_aids = rolls and knows_lateral_aids(database)
+    for name in LATERAL_AIDS.intersection(options.aids):
+        if not lateral_aids:
+            raise lateral_aid_error(name)
     tables = SimulationTables(
         dt=dt,
         wind=wind,
@@ -311,6 +318,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         ground=ground,
         engine=load_engine_tables(profile, density=own.configuration.density),
         aids=design_aids(database),
+        lateral_aids=design_lateral_aids(database),
         gusts=gust_tables(setup.air, profile),
         faults=fault_tables(setup.faults, profile),
         # Laws in Python are called from outside the compiled frame; the monitor still predicts in it.
@@ -335,6 +343,7 @@ def build_parts(setup: FlightSetup) -> Parts:
         database=database,
         database_hash=loaded.aircraft_hash,
         needed_aids=_needed_aids(setup, loaded),
+        lateral_aids=lateral_aids,
         start_x=x,
         start_u=u,
         start_held=offset,
@@ -414,6 +423,21 @@ def needed_aid_error(name: str) -> InputError:
         name: The aid.
     """
     return needed_inputs_error(name, "off", "on", (*FLAP_INPUTS, "rotor_speed"))
+
+
+def lateral_aid_error(name: str) -> InputError:
+    """The refusal of an aid that needs to know the aircraft out of its plane of symmetry.
+
+    Args:
+        name: The aid.
+    """
+    return InputError(
+        "cannot be switched on: the database or this form of it does not say how the aircraft rolls and turns",
+        key=name,
+        value="on",
+        allowed="off",
+        mend="fly the plant lpv or nonlinear of a database with a lateral half and gains for it (docs/lpv.md)",
+    )
 
 
 def needed_inputs_error(key: str, value: str, allowed: str, inputs: Sequence[str]) -> InputError:
@@ -551,4 +575,6 @@ def restart(flying: Flying, setup: FlightSetup, parts: Parts) -> None:
     flying.engage()
 
 
-__all__ = ["FlightSetup", "Parts", "build_parts", "needed_aid_error", "prepare", "restart", "start_trim"]
+__all__ = [
+    "FlightSetup", "Parts", "build_parts", "lateral_aid_error", "needed_aid_error", "prepare", "restart", "start_trim",
+]  # fmt: skip

@@ -11,6 +11,7 @@ import numpy as np
 
 from rtsim.aids.aids_kernels import MEMORY
 from rtsim.aids.design import SWITCHES, switch_of
+from rtsim.aids.lateral_design import LATERAL_AIDS
 from rtsim.aircraft.variables import INPUT
 from rtsim.arguments import instance, whole_number
 from rtsim.arrays import FloatArray
@@ -27,7 +28,15 @@ from rtsim.kernels.compiled import interpreted
 from rtsim.loop.data import CLOCK, END, END_REASONS, KNOWN, MODES, STATION, SimulationState, SimulationTables
 from rtsim.loop.flying import WHOLE, Flying, new_normals
 from rtsim.loop.frame_kernels import ASK, COMPLETE, CONSULT, LIMIT, OBSERVE, SCRIPT
-from rtsim.loop.setup import FlightSetup, Parts, build_parts, needed_aid_error, prepare, restart
+from rtsim.loop.setup import (
+    FlightSetup,
+    Parts,
+    build_parts,
+    lateral_aid_error,
+    needed_aid_error,
+    prepare,
+    restart,
+)
 from rtsim.lpv.database import Database
 from rtsim.pilot.layout_kernels import TARGET
 from rtsim.programme import Programme
@@ -279,6 +288,8 @@ class Simulation:
         place = SWITCHES[switch_of(name)]
         if not on and name in self._parts.needed_aids:
             raise needed_aid_error(name)
+        if on and name in LATERAL_AIDS and not self._parts.lateral_aids:
+            raise lateral_aid_error(name)
         if on and name == "automatic_rotor_speed":
             check_slow_rotors(self.tables.drive)
         self._state.switches[place] = 1.0 if on else 0.0

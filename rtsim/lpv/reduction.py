@@ -85,6 +85,29 @@ def settled(
     )
 
 
+def eliminated(
+    a: FloatArray, b: FloatArray, kept: Sequence[int], inputs: Sequence[int]
+) -> tuple[FloatArray, FloatArray]:
+    """Let all states settle but some, of any linear models.
+
+    Args:
+        a: Dynamics [..., n, n].
+        b: Effect of the inputs [..., n, m].
+        kept: Positions of the states that are left, in this order.
+        inputs: Positions of the inputs that are left, in this order.
+
+    Returns:
+        Dynamics and effect of the inputs that are left.
+    """
+    slow, columns = list(kept), list(inputs)
+    fast = [place for place in range(a.shape[-1]) if place not in slow]
+    rows, quick = a[..., slow, :], a[..., fast, :]
+    push = np.concatenate([quick[..., slow], b[..., fast, :][..., columns]], axis=-1)
+    inner = np.linalg.solve(quick[..., fast], push)
+    reduced_a = rows[..., slow] - rows[..., fast] @ inner[..., : len(slow)]
+    return reduced_a, b[..., slow, :][..., columns] - rows[..., fast] @ inner[..., len(slow) :]
+
+
 def settle(inner: FloatArray, push: FloatArray, *, by_inverse: bool = False) -> FloatArray:
     """Where fast states settle [..., f, n].
 

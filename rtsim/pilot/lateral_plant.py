@@ -14,6 +14,7 @@ import numpy as np
 from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_STATES, of_role, position
 from rtsim.arrays import FloatArray
 from rtsim.lpv.lateral import LateralData
+from rtsim.lpv.reduction import eliminated
 from rtsim.pilot.weights import LateralPilotSettings
 
 RIGID = ("v", "p", "r", "bank", "heading")
@@ -56,13 +57,8 @@ def lateral_plant(
     rigid = [position(LATERAL_STATES, name) for name in RIGID]
     lags = list(of_role(LATERAL_STATES, "actuator"))
     slow = rigid + lags
-    fast = [k for k in range(len(LATERAL_STATES)) if k not in slow]
     inputs = [position(LATERAL_INPUTS, name) for name in (*HANDS, "gust_v")]
-    inner = np.linalg.solve(
-        full_a[np.ix_(fast, fast)], np.hstack([full_a[np.ix_(fast, slow)], full_b[np.ix_(fast, inputs)]])
-    )
-    a = full_a[np.ix_(slow, slow)] - full_a[np.ix_(slow, fast)] @ inner[:, : len(slow)]
-    b = full_b[np.ix_(slow, inputs)] - full_a[np.ix_(slow, fast)] @ inner[:, len(slow) :]
+    a, b = eliminated(full_a, full_b, slow, inputs)
 
     n, r = len(STATES), len(RIGID)
     plant_a, plant_b, plant_e = np.zeros((n, n)), np.zeros((n, len(HANDS))), np.zeros((n, 1))
