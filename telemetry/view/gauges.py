@@ -1,6 +1,9 @@
 """The lower instruments: conversion-angle dial, flapping and torque of both rotors, power, positions of the controls.
 
 Units are those of the drawing of ``telemetry.view.instruments``.
+
+Legend:
+    art: What is drawn on.
 """
 
 from __future__ import annotations

@@ -80,7 +80,12 @@ def ring_radius(trail: list[tuple[float, float]], here: tuple[float, float]) -> 
 
 
 def on_map(north: float, east: float) -> FloatArray:
-    """Where a direction points on the map."""
+    """Where a direction points on the map.
+
+    Args:
+        north: Its part to the north.
+        east: Its part to the east.
+    """
     return np.array([east, -north])
 
 

@@ -317,7 +317,7 @@ def test_the_picture_says_what_matters():
     view = VehicleView()
     console.print(picture(Controls(), view, device="Pad", rate_hz=50.0))
     view.system_id, view.heard, view.custom_mode = 1, time.monotonic(), 0x00070000
-    view.values |= {"nac_deg": 75.0, "airspeed_kt": 80.0}
+    view.values |= {"nac_deg": 75.0, "airspeed_kt": 80.0, "bank_deg": -12.0, "heading_deg": 270.0}
     view.texts = ["Corridor clear"]
     console.print(picture(Controls(stick=0.5), view, device="Pad", rate_hz=50.0))
     view.heard = 0.0
@@ -329,6 +329,8 @@ def test_the_picture_says_what_matters():
         "Stabilized",
         "nacelle 75.0 deg",
         "airspeed 80 kn",
+        "bank -12 deg",
+        "heading 270 deg",
         "Corridor clear",
         "silent",
     ):
