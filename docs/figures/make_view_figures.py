@@ -88,7 +88,7 @@ def shoot(port: int, name: str) -> None:
     place = HERE / f"{name}.png"
     ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(place))
     with Image.open(place) as picture:
-        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        small = picture.convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     small.save(place, optimize=True)
 
 

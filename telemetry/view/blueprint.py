@@ -56,7 +56,7 @@ def _pilot(*, follow: bool) -> Any:
     plots = [_time_series(path, title, follow=follow) for path, (title, _) in PILOT_PLOTS.items()]
     top = rrb.Horizontal(_flight(), _instruments(), _corridor(), column_shares=[4.6, 4.35, 4.35])
     bottom = rrb.Horizontal(
-        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), _map(), column_shares=[7.1, 2.0, 2.2, 2.2]
+        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), _map(), column_shares=[6.4, 1.8, 3.2, 2.1]
     )
     return rrb.Vertical(top, bottom, row_shares=[2.0, 1.0])
 
