@@ -120,7 +120,7 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("load_factor", "", "loads", "Normal load factor, 1 in level flight."),
     Signal("coning_deg", "deg", "flapping", "Coning angle of the blades, precone included."),
     Signal("longitudinal_flapping_deg", "deg", "flapping", "Cosine gimbal flapping; positive tilts the disc forward."),
-    Signal("lateral_flapping_deg", "deg", "flapping", "Sine gimbal flapping."),
+    Signal("lateral_flapping_deg", "deg", "flapping", "Sine gimbal flapping; positive lifts the outboard edge."),
     Signal("collective_75_deg", "deg", "controls", "Collective pitch at 75 % radius."),
     Signal("cyclic_deg", "deg", "controls", "Longitudinal cyclic pitch theta1s; negative tilts the disc forward."),
     Signal("elevator_deg", "deg", "controls", "Elevator, trailing edge down positive."),
@@ -225,6 +225,15 @@ SIGNALS: tuple[Signal, ...] = (
     Signal("lateral_reference_kt", "kn", "speed", "Sideways airspeed asked for along body y, after its filter."),
     Signal("track_error_m", "m", "position", "Place to the right of the line over the ground that is held; 0: none."),
     Signal("point_error_m", "m", "position", "Distance from the point over the ground that is held; 0: none."),
+    Signal(
+        "differential_longitudinal_flapping_deg",
+        "deg",
+        "flapping",
+        "Half difference of cosine flapping, right less left.",
+    ),
+    Signal(
+        "differential_lateral_flapping_deg", "deg", "flapping", "Half difference of sine flapping, right less left."
+    ),
 )
 """Every signal of the history, in the order of the columns and of the history hash."""
 

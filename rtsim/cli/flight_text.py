@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
 import threading
 from collections import deque
@@ -101,7 +102,8 @@ class FlightScreen:
                 self._clear_status()
                 self._tell_events()
             if on_terminal and self._row is not None:
-                sys.stderr.write(f"\r{status_line(self._row, self._control)}\x1b[K")
+                width = shutil.get_terminal_size().columns
+                sys.stderr.write(f"\r{status_line(self._row, self._control, width=width)}\x1b[K")
                 sys.stderr.flush()
                 self._status_shown = True
 
@@ -121,21 +123,34 @@ class FlightScreen:
                 say("            (further events are in the log)")
 
 
-def status_line(row: FloatArray, control: FlightControl) -> str:
-    """One line about a frame.
+def status_line(row: FloatArray, control: FlightControl, *, width: int) -> str:
+    """One line about a frame, the more important first; angles in degrees, speeds in knots.
 
     Args:
         control: Tells whether the flight is paused, and its speed.
+        width: Columns of the terminal; what has no room is left out.
     """
     from rtsim.frame import COLUMN
 
     state = "paused" if control.paused else "max" if math.isinf(control.speed) else f"{control.speed:g}x"
-    return (
-        f"{row[COLUMN.time_s]:7.1f} s {state:>6} | {row[COLUMN.airspeed_kt]:6.1f} kn | "
-        f"nacelle {row[COLUMN.nacelle_deg]:5.1f} deg | {row[COLUMN.altitude_m]:6.1f} m | "
-        f"pitch {row[COLUMN.pitch_deg]:5.1f} deg | flapping {row[COLUMN.flapping_deg]:4.1f} deg | "
-        f"margin {row[COLUMN.margin_kt]:5.1f} kn"
+    heading = (row[COLUMN.heading_deg] + 0.5) // 1.0 % 360.0
+    parts = (
+        f"{row[COLUMN.time_s]:6.1f} s {state:>6}",
+        f"{row[COLUMN.airspeed_kt]:5.1f} kn",
+        f"nac {row[COLUMN.nacelle_deg]:4.1f}",
+        f"{row[COLUMN.altitude_m]:6.1f} m",
+        f"margin {row[COLUMN.margin_kt]:5.1f}",
+        f"hdg {heading:03.0f}",
+        f"bank {row[COLUMN.bank_deg]:+3.0f}",
+        f"pitch {row[COLUMN.pitch_deg]:+5.1f}",
+        f"flapping {row[COLUMN.flapping_deg]:4.1f}",
     )
+    line = parts[0]
+    for part in parts[1:]:
+        if len(line) + 2 + len(part) >= width:  # a line that wraps would not be overwritten
+            break
+        line += f"  {part}"
+    return line
 
 
 def say(sentence: str, *, style: str | None = None) -> None:

@@ -216,6 +216,8 @@ def _note_lateral(flight: Flight, sideways: float) -> None:
     si[QUANTITY.track] = _wrapped(heading + math.atan2(right, ahead)) if moves else si[QUANTITY.heading]
     si[QUANTITY.flapping_right] = _flapping(x, 1.0)
     si[QUANTITY.flapping_left] = _flapping(x, -1.0)
+    si[QUANTITY.differential_longitudinal_flapping] = x[STATE.flap_1c_difference]
+    si[QUANTITY.differential_lateral_flapping] = x[STATE.flap_1s_difference]
     si[QUANTITY.mast_torque_right] = y[OUTPUT.torque] + y[OUTPUT.torque_difference]
     si[QUANTITY.mast_torque_left] = y[OUTPUT.torque] - y[OUTPUT.torque_difference]
     si[QUANTITY.aileron] = x[STATE.aileron]

@@ -24,6 +24,8 @@ _SHOWN = (
     ("altitude_m", "altitude", "m", 0),
     ("climb_m_s", "climb", "m/s", 1),
     ("pitch_deg", "pitch", "deg", 1),
+    ("bank_deg", "bank", "deg", 0),
+    ("heading_deg", "heading", "deg", 0),
     ("corr_lo", "above the low side", "kn", 0),
     ("corr_hi", "below the high side", "kn", 0),
     ("flap_deg", "flapping", "deg", 1),

@@ -203,6 +203,10 @@ class Sender:
                 "climb_m_s": message.climb,
             }
         elif name == "ATTITUDE":
-            view.values["pitch_deg"] = math.degrees(message.pitch)
+            view.values |= {
+                "pitch_deg": math.degrees(message.pitch),
+                "bank_deg": math.degrees(message.roll),
+                "heading_deg": math.degrees(message.yaw) % 360.0,
+            }
         elif name == "STATUSTEXT":
             view.texts = [*view.texts[-5:], message.text]

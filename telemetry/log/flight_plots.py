@@ -1,4 +1,4 @@
-"""Pictures of a recorded flight: path through the corridor, time histories with units, controls, margins, timing."""
+"""Pictures of a recorded flight: path through the corridor and over the ground, time histories, margins, timing."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from rtsim.errors import InputError, OutputError
 from rtsim.whole_file import whole_file
 from telemetry.log.reader import FlightLog
 from telemetry.log.signal_groups import label, plot_groups
+from telemetry.log.track_plot import draw_track, marked
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,12 +70,27 @@ _LATERAL_CONTROLS = (
     _Panel("Pedals, 1 is full right", ("pedal",), ("pilot_pedal",), "protection_pedal_reason"),
 )
 _TRAVELS = ("stick", "lever", "lateral_stick", "pedal")
+_COURSE = (
+    _Panel("Bank, right positive", ("bank_deg",)),
+    _Panel("Heading and course over the ground", ("heading_deg", "track_deg")),
+    _Panel("Sideslip, wind from the right positive", ("sideslip_deg",)),
+    _Panel("Sideward airspeed, right positive", ("lateral_kt",)),
+    _Panel("Turn rate and rate of roll", ("turn_rate_deg_s", "roll_rate_deg_s")),
+)
+_COMPASS = ("heading_deg", "track_deg")
 _ROTOR = (
     _Panel("Flapping", ("flapping_deg", "longitudinal_flapping_deg", "lateral_flapping_deg")),
     _Panel("Torque of one mast", ("mast_torque_inlb",)),
     _Panel("Power", ("power_shp", "engine_power_shp")),
     _Panel("Load factor", ("load_factor",)),
 )
+_BOTH_ROTORS = (
+    _Panel("Flapping of each rotor", ("flapping_right_deg", "flapping_left_deg"), ("flapping_deg",)),
+    _Panel("Torque of each mast", ("mast_torque_right_inlb", "mast_torque_left_inlb")),
+)
+_SIDEWAYS = ("bank_deg", "sideslip_deg", "turn_rate_deg_s")
+_NOTICED = 0.05
+"""Bank, sideslip and turn rate from which on a flight is drawn as one that moved sideways [deg, deg/s]."""
 
 
 def plot_flight(log: FlightLog, directory: str | os.PathLike[str]) -> list[Path]:
@@ -110,13 +126,21 @@ def _pictures(log: FlightLog) -> list[_Picture]:
         ("corridor", _draw_corridor, (7.5, 6.5)),
         ("flight", lambda flight, figure: _draw_panels(flight, figure, _FLIGHT), (9.0, 9.0)),
         ("controls", _draw_controls, (9.0, 9.0)),
-        ("flapping", lambda flight, figure: _draw_panels(flight, figure, _ROTOR), (9.0, 9.0)),
+        ("flapping", _draw_rotors, (9.0, 9.0)),
         ("margins", _draw_margins, (9.0, 6.0)),
-        ("signals", _draw_all_signals, (15.0, 18.0)),
+        ("signals", _draw_all_signals, (15.0, 22.0)),
     ]
+    if _moved_sideways(log):
+        pictures.append(("track", draw_track, (7.5, 7.5)))
+        pictures.append(("course", lambda flight, figure: _draw_panels(flight, figure, _COURSE), (9.0, 9.0)))
     if np.isfinite(log["lateness_us"]).any():
         pictures.append(("timing", _draw_timing, (9.0, 7.0)))
     return pictures
+
+
+def _moved_sideways(log: FlightLog) -> bool:
+    """Whether there is something to see out of the plane of symmetry."""
+    return any(float(np.nanmax(np.abs(log[name]))) > _NOTICED for name in _SIDEWAYS)
 
 
 def _write(
@@ -144,6 +168,7 @@ def _write(
             options: dict[str, Any] = {"metadata": {"Date": None}} if ending == "svg" else {"dpi": 130}
             with whole_file(path) as temporary:
                 figure.savefig(temporary, **options)
+            figure.set_layout_engine("none")  # what was laid out stays: it takes longer than drawing
             yield path
 
 
@@ -153,9 +178,12 @@ def _thin(values: FloatArray) -> FloatArray:
 
 
 def _curve(axes: Axes, log: FlightLog, name: str, *, colour: str, dashed: bool = False) -> None:
+    values = _thin(log[name])
+    if name in _COMPASS:  # no line across the plot where north is passed
+        values = np.where(np.abs(np.diff(values, prepend=values[0])) > 180.0, np.nan, values)
     axes.plot(
         _thin(log["time_s"]),
-        _thin(log[name]),
+        values,
         color=colour,
         linewidth=1.0 if dashed else 1.4,
         linestyle="--" if dashed else "-",
@@ -163,13 +191,13 @@ def _curve(axes: Axes, log: FlightLog, name: str, *, colour: str, dashed: bool =
     )
 
 
-def _legend(axes: Axes, *, size: float = 8.0) -> None:
+def _legend(axes: Axes, *, size: float = 8.0, rows: int = 1) -> None:
     """Names above the axes on the right, where they cover no curve."""
     count = len(axes.get_legend_handles_labels()[0])
     axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
-        ncols=count,
+        ncols=-(-count // rows),
         frameon=False,
         fontsize=size,
         borderpad=0.0,
@@ -182,6 +210,10 @@ def _legend(axes: Axes, *, size: float = 8.0) -> None:
 def _draw_controls(log: FlightLog, figure: Figure) -> None:
     sideways = any(log[panel.signals[0]].any() or log[panel.dashed[0]].any() for panel in _LATERAL_CONTROLS)
     _draw_panels(log, figure, _CONTROLS + _LATERAL_CONTROLS if sideways else _CONTROLS)
+
+
+def _draw_rotors(log: FlightLog, figure: Figure) -> None:
+    _draw_panels(log, figure, _ROTOR[:1] + _BOTH_ROTORS + _ROTOR[2:] if _moved_sideways(log) else _ROTOR)
 
 
 def _draw_panels(log: FlightLog, figure: Figure, panels: tuple[_Panel, ...]) -> None:
@@ -258,23 +290,10 @@ def _tell_downstop(axes: Axes, log: FlightLog, outline: CorridorOutline) -> None
 
 
 def _mark_times(axes: Axes, log: FlightLog) -> None:
-    """Marks along the path; those that would cover one another become one with the span of their times."""
-    time, speed, nacelle = log["time_s"], log["airspeed_kt"], log["nacelle_deg"]
-    places: list[tuple[int, list[float]]] = []
-    for mark in np.arange(time[0], time[-1] + 1e-9, _mark_step(float(time[-1] - time[0]))):
-        index = min(int(np.searchsorted(time, mark)), len(time) - 1)
-        near = [
-            marks
-            for place, marks in places
-            if abs(speed[place] - speed[index]) < _NEAR_KT and abs(nacelle[place] - nacelle[index]) < _NEAR_DEG
-        ]
-        if near:
-            near[0].append(float(mark))
-        else:
-            places.append((index, [float(mark)]))
-    for index, marks in places:
+    """Marks along the path through the corridor."""
+    speed, nacelle = log["airspeed_kt"], log["nacelle_deg"]
+    for index, words in marked(log["time_s"], (speed, nacelle), (_NEAR_KT, _NEAR_DEG)):
         axes.plot(speed[index], nacelle[index], "o", color=_COLOURS[0], markersize=3.5)
-        words = f"{marks[0]:.0f} s" if len(marks) == 1 else f"{marks[0]:.0f} to {marks[-1]:.0f} s"
         axes.annotate(words, (speed[index], nacelle[index]), textcoords="offset points", xytext=(5, 5), fontsize=7)
 
 
@@ -303,15 +322,20 @@ def _draw_all_signals(log: FlightLog, figure: Figure) -> None:
     for axes, group in zip(grid, groups, strict=False):
         for index, column in enumerate(group.columns):
             _curve(axes, log, log.names[column], colour=_COLOURS[index % len(_COLOURS)])
-        long = sum(len(label(log.names[column], unit=False)) for column in group.columns) > 44
-        axes.set_title(group.title if not long else group.title.partition(" [")[0], loc="left", fontsize=8.5)
+        letters = sum(len(label(log.names[column], unit=False)) + 6 for column in group.columns)
+        long = letters > 56
+        rows = -(-letters // 90) if long else 1
+        axes.set_title(
+            group.title if not long else group.title.partition(" [")[0], loc="left", fontsize=8.5,
+            pad=7.0 * rows + 3.0 if long else None,
+        )  # fmt: skip
         if long:
             axes.set_ylabel(f"[{group.title.partition(' [')[2]}", fontsize=8)
         low, high = axes.get_ylim()
         if high - low < 0.2 and len({float(log[log.names[column]].max()) for column in group.columns}) == 1:
             axes.set_ylim(0.5 * (low + high) - 1.0, 0.5 * (low + high) + 1.0)  # nothing moves: no zoom into nothing
         if len(group.columns) > 1:
-            _legend(axes, size=5.5 if long else 6.5)
+            _legend(axes, size=5.5 if long else 6.5, rows=rows)
     for axes in grid[len(groups) :]:
         axes.set_visible(False)
     for axes in grid[: len(groups)][-3:]:
@@ -344,8 +368,3 @@ def _draw_timing(log: FlightLog, figure: Figure) -> None:
     lower.set_xlabel("time [us]")
     lower.set_ylabel("frames")
     lower.legend(loc="upper right", fontsize=8)
-
-
-def _mark_step(duration_s: float) -> float:
-    """Seconds between the marks on the path: about eight of them."""
-    return next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0) if duration_s / step <= 8.0), 300.0)

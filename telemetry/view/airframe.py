@@ -1,14 +1,14 @@
-"""The XV-15 as triangles: lofted fuselage, wing, tail and nacelles, rotor discs and blades.
+"""The XV-15 as triangles: lofted fuselage, wing, tail and nacelles, rotor discs and blades, control surfaces.
 
 Dimensions follow NASA CR-166536 (stations in inches: SL aft, BL right, WL up) and the XV-15 familiarization
 document, TM X-62407; shapes between them are drawn by eye. Meshes are in metres, x forward, y right, z down; body
-parts about the centre of gravity in hover, nacelle parts about the conversion axis with the mast along +x, rotor
-parts about the hub. No viewer is needed here.
+parts about the centre of gravity in hover, control surfaces about a point of their hinge, nacelle parts about the
+conversion axis with the mast along +x, rotor parts about the hub. No viewer is needed here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -115,34 +115,73 @@ def fuselage() -> Mesh:
 
 
 def wing() -> Mesh:
-    """Wing from tip to tip: constant chord, 23 % thick, swept forward, with dihedral."""
-    spans = np.array([-193.0, -100.0, -30.0, 30.0, 100.0, 193.0])
-    sections = np.stack([_airfoil(63.0, 0.23, 28) for _ in spans])
-    for section, span in zip(sections, spans, strict=True):
-        section[:, 0] += 297.4 - 0.114 * abs(span)  # leading edge; 6.5 deg forward sweep
-        section[:, 1] = span
-        section[:, 2] += 96.0 + 0.0209 * abs(span)  # 1.2 deg dihedral takes the chord to WL 100 at the tip
-    return loft(_stations_to_body(sections), WHITE)
+    """Wing from tip to tip: constant chord, 23 % thick, swept forward, with dihedral, cut out for its flaps."""
+    whole = _airfoil(_WING_CHORD, 0.23, 28)
+    half = [(_ROOT, whole), *((span, _front(whole)) for span in _CUTS), (193.0, whole)]
+    sections = [_wing_section(-span, outline) for span, outline in half[::-1]]
+    sections += [_wing_section(span, outline) for span, outline in half]
+    return loft(_stations_to_body(np.stack(sections)), WHITE)
 
 
 def tail() -> Mesh:
-    """Horizontal tail with its two fins."""
-    flat = np.stack([_airfoil(47.0, 0.15, 20) for _ in range(3)])
-    for section, span in zip(flat, (-77.0, 0.0, 77.0), strict=True):
-        section[:, 0] += 548.0
-        section[:, 1] = span
-        section[:, 2] += 103.0
-    parts = [loft(_stations_to_body(flat), WHITE)]
+    """Horizontal tail with its two fins, cut out for elevator and rudders."""
+    front = _front(_airfoil(_TAIL_CHORD, 0.15, 20), _TAIL_CUT)
+    parts = [loft(_stations_to_body(np.stack([_tail_section(span, front) for span in (-77.0, 0.0, 77.0)])), WHITE)]
     for side in (-1.0, 1.0):
-        levels = ((66.0, 20.0, 34.0), (103.0, 0.0, 50.0), (160.0, 24.0, 32.0))  # WL, leading edge, chord [in]
-        fin = np.empty((3, 20, 3))
-        for section, (level, edge, chord) in zip(fin, levels, strict=True):
-            outline = _airfoil(chord, 0.09, 20)
-            section[:, 0] = outline[:, 0] + 546.0 + edge
-            section[:, 1] = 77.0 * side + outline[:, 2]
-            section[:, 2] = level
-        parts.append(loft(_stations_to_body(fin), BLUE))
+        fin = [_fin_section(side, level) for level in _FIN_LEVELS[:2]]
+        fin += [_fin_section(side, level, part=_front) for level in _FIN_LEVELS[1:]]
+        parts.append(loft(_stations_to_body(np.stack(fin)), BLUE))
     return merge(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """A part that turns about a hinge; at 0 it fills its cut-out."""
+
+    mesh: Mesh
+    """The part, about ``place``."""
+    place: FloatArray
+    """A point of the hinge in the body frame [m]."""
+    axis: FloatArray
+    """Direction of the hinge; a positive angle takes the trailing edge down, or to the right."""
+
+
+def flap(side: float) -> Surface:
+    """The inboard flap of one side.
+
+    Args:
+        side: 1 right, -1 left.
+    """
+    return _wing_surface(side, _CUTS[0], _CUTS[1])
+
+
+def flaperon(side: float) -> Surface:
+    """The flaperon of one side.
+
+    Args:
+        side: 1 right, -1 left.
+    """
+    return _wing_surface(side, _CUTS[2], _CUTS[3])
+
+
+def elevator() -> Surface:
+    """The elevator."""
+    back = _back(_airfoil(_TAIL_CHORD, 0.15, 20), _TAIL_CUT)
+    sections = np.stack([_tail_section(span, back) for span in (-75.0, 75.0)])
+    hinge = [np.array([548.0 + _TAIL_CUT * _TAIL_CHORD, span, 103.0]) for span in (-75.0, 75.0)]
+    return _surface(sections, hinge, GREY)
+
+
+def rudder(side: float) -> Surface:
+    """The rudder of one fin, on its upper half.
+
+    Args:
+        side: 1 right, -1 left.
+    """
+    lower, upper = _FIN_LEVELS[1:]
+    sections = np.stack([_fin_section(side, level, part=_back) for level in (lower, upper)])
+    hinge = [np.array([546.0 + edge + _CUT * chord, 77.0 * side, level]) for level, edge, chord in (lower, upper)]
+    return _surface(sections, hinge, WHITE)
 
 
 def nacelle() -> Mesh:
@@ -174,8 +213,9 @@ def blades(direction: float) -> Mesh:
         radial = np.array([0.0, np.cos(azimuth), np.sin(azimuth)])
         sections = np.empty((len(stations), 16, 3))
         for section, station in zip(sections, stations, strict=True):
-            twist = np.radians(40.0 * (0.75 - station) * direction)
-            chordwise = np.cos(twist) * np.array([0.0, -radial[2], radial[1]]) + np.sin(twist) * np.array([1.0, 0, 0])
+            twist = np.radians(40.0 * (0.75 - station))
+            ahead = direction * np.array([0.0, -radial[2], radial[1]])
+            chordwise = -np.cos(twist) * ahead - np.sin(twist) * np.array([1.0, 0, 0])  # leading edge up
             normal = np.cross(radial, chordwise)
             outline = _airfoil(0.42, 0.14, 16)
             section[:] = (
@@ -213,6 +253,64 @@ def circle(points: int) -> FloatArray:
     """
     angle = np.linspace(0.0, 2.0 * np.pi, points + 1)
     return ROTOR_RADIUS * np.stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)], 1)
+
+
+_WING_CHORD, _TAIL_CHORD = 63.0, 47.0
+_CUT, _TAIL_CUT = 0.75, 0.7
+"""Where along the chord flaps, flaperons and rudders, and where the elevator, begin."""
+_ROOT = 35.0
+_CUTS = (36.0, 96.0, 98.0, 192.0)
+"""BL of the ends of flap and flaperon [in]."""
+_FIN_LEVELS = ((66.0, 20.0, 34.0), (103.0, 0.0, 50.0), (160.0, 24.0, 32.0))
+"""WL, leading edge behind SL 546, chord [in]."""
+
+
+def _front(outline: FloatArray, cut: float = _CUT) -> FloatArray:
+    """A section without what is behind a share of its chord."""
+    return np.stack([np.minimum(outline[:, 0], cut * outline[:, 0].max()), outline[:, 1], outline[:, 2]], 1)
+
+
+def _back(outline: FloatArray, cut: float = _CUT) -> FloatArray:
+    """What is behind a share of a section's chord."""
+    edge = cut * outline[:, 0].max()
+    inside = np.sort(outline[outline[:, 0] >= edge, 2])
+    return np.stack([np.maximum(outline[:, 0], edge), outline[:, 1], np.clip(outline[:, 2], inside[0], inside[-1])], 1)
+
+
+def _wing_section(span: float, outline: FloatArray) -> FloatArray:
+    """A section at a BL [in]: leading edge swept 6.5 deg forward, 1.2 deg dihedral to WL 100 at the tip."""
+    edge: FloatArray = np.array([297.4 - 0.114 * abs(span), span, 96.0 + 0.0209 * abs(span)])
+    return outline + edge
+
+
+def _tail_section(span: float, outline: FloatArray) -> FloatArray:
+    edge: FloatArray = np.array([548.0, span, 103.0])
+    return outline + edge
+
+
+def _fin_section(
+    side: float, level: tuple[float, float, float], *, part: Callable[[FloatArray], FloatArray] | None = None
+) -> FloatArray:
+    height, edge, chord = level
+    outline = _airfoil(chord, 0.09, 20)
+    if part is not None:
+        outline = part(outline)
+    return np.stack([outline[:, 0] + 546.0 + edge, 77.0 * side + outline[:, 2], np.full(len(outline), height)], 1)
+
+
+def _wing_surface(side: float, inner: float, outer: float) -> Surface:
+    """Flap or flaperon between two BL; its hinge runs to the right on both sides."""
+    spans = sorted((side * inner, side * outer))
+    back = _back(_airfoil(_WING_CHORD, 0.23, 28))
+    hinge = [_wing_section(span, np.array([[_CUT * _WING_CHORD, 0.0, 0.0]]))[0] for span in spans]
+    return _surface(np.stack([_wing_section(span, back) for span in spans]), hinge, GREY)
+
+
+def _surface(sections: FloatArray, hinge: list[FloatArray], colour: Colour) -> Surface:
+    """What is lofted through sections [in], turning about the line from the first point of the hinge to the second."""
+    first, second = (_stations_to_body(point) for point in hinge)
+    axis = (second - first) / np.linalg.norm(second - first)
+    return Surface(loft(_stations_to_body(sections) - first, colour), first, axis)
 
 
 def _power(value: FloatArray, exponent: float) -> FloatArray:

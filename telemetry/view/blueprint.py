@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from telemetry.log.signal_groups import plot_groups
 from telemetry.view import corridor as rerun_corridor
+from telemetry.view import ground_map
 from telemetry.view import instruments as rerun_instruments
 from telemetry.view.colours import BACKGROUND
 from telemetry.view.options import Layout
@@ -20,8 +21,8 @@ SHOWN_SECONDS = 30.0
 
 ENGINEER_TABS: dict[str, tuple[str, ...]] = {
     "Controls, rotors and loads": (),
-    "Motion": ("speed", "nacelle", "altitude", "attitude", "position"),
-    "Corridor, protection and air": ("corridor", "protection", "air", "failures"),
+    "Motion": ("speed", "nacelle", "altitude", "attitude", "position", "course"),
+    "Corridor, protection and air": ("corridor", "protection", "air", "wind", "failures"),
     "Loop health": ("loop",),
 }
 """Tabs of the engineer's layout and the groups of signals in each; the first takes those that are nowhere else."""
@@ -51,11 +52,11 @@ def blueprint(layout: Layout) -> Any:
 
 
 def _pilot(*, follow: bool) -> Any:
-    """Aircraft, instruments and corridor large; four plots and the events below."""
+    """Aircraft, instruments and corridor large; four plots, the events and the map below."""
     plots = [_time_series(path, title, follow=follow) for path, (title, _) in PILOT_PLOTS.items()]
     top = rrb.Horizontal(_flight(), _instruments(), _corridor(), column_shares=[4.6, 4.35, 4.35])
     bottom = rrb.Horizontal(
-        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), column_shares=[8.1, 2.2, 3.0]
+        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), _map(), column_shares=[6.4, 1.8, 3.2, 2.1]
     )
     return rrb.Vertical(top, bottom, row_shares=[2.0, 1.0])
 
@@ -76,7 +77,7 @@ def _engineer(*, follow: bool) -> Any:
         ]
         return rrb.Grid(*views, grid_columns=2 if len(views) < 7 else 3, name=name)
 
-    left = rrb.Vertical(_corridor(), _flight(), _events(), row_shares=[4.0, 3.0, 2.0])
+    left = rrb.Vertical(rrb.Tabs(_corridor(), _map()), _flight(), _events(), row_shares=[4.0, 3.0, 2.0])
     tabs = rrb.Tabs(*(grid(name, names) for name, names in ENGINEER_TABS.items()), active_tab=0)
     return rrb.Horizontal(
         left, rrb.Vertical(tabs, _modes(follow=follow), row_shares=[2.2, 1.0]), column_shares=[1.0, 2.2]
@@ -112,6 +113,10 @@ def _instruments() -> Any:
 
 def _corridor() -> Any:
     return _flat("corridor", "Conversion corridor", rerun_corridor.BOUNDS)
+
+
+def _map() -> Any:
+    return _flat("map", "Map", ground_map.BOUNDS)
 
 
 def _events() -> Any:

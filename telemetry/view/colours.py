@@ -19,6 +19,8 @@ LOW_SIDE, HIGH_SIDE = (255, 176, 66), (255, 92, 92)
 """Low-speed and high-speed boundary of the corridor."""
 ACTING = (232, 121, 249)
 """What a protection law takes from the hands."""
+WIND = (178, 206, 255)
+"""Where the air goes."""
 TRAIL = (96, 165, 250)
 LEFT_ROTOR, RIGHT_ROTOR = (255, 110, 100), (96, 165, 250)
 SKY, GROUND = (44, 104, 178), (108, 76, 44)

@@ -1,4 +1,4 @@
-"""The pilot's instruments in one flat view: attitude, airspeed and altitude tapes, conversion angle, numerals.
+"""The pilot's instruments in one flat view: attitude, airspeed, altitude and heading tapes, conversion angle, numerals.
 
 Units are those of the drawing: x right, y down, (0, 0) in the middle of the attitude ball.
 """
@@ -13,8 +13,8 @@ import rerun as rr
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
+from telemetry.view import gauges
 from telemetry.view.colours import (
-    ACTING,
     AMBER,
     BACKGROUND,
     CYAN,
@@ -26,7 +26,6 @@ from telemetry.view.colours import (
     LEVELS,
     LOW_SIDE,
     PANEL,
-    RED,
     SKY,
     TEXT,
     WHITE,
@@ -34,7 +33,7 @@ from telemetry.view.colours import (
 from telemetry.view.corridor import level_of
 from telemetry.view.strokes import LineArt
 
-BOUNDS = ((-160.0, 160.0), (-101.0, 224.0))
+BOUNDS = ((-160.0, 160.0), (-101.0, 278.0))
 """What the view shows: x range, y range."""
 LEVEL_WORDS = ("CORRIDOR CLEAR", "CORRIDOR CAUTION", "CORRIDOR WARNING", "OUTSIDE CORRIDOR")
 """What the band under the ball says at each level."""
@@ -45,11 +44,16 @@ PICTURES_PER_TEXT = 3
 _PITCH_SCALE = 3.2  # units per degree
 _SPEED_SCALE = 1.6  # units per knot
 _ALTITUDE_SCALE = 3.0  # units per metre
+_HEADING_SCALE = 2.5  # units per degree
 _BALL_EDGE, _TAPE_EDGE = 78.0, 156.0
-_TOP, _BOTTOM = -96.0, 84.0
+_TOP, _BALL_BOTTOM, _BOTTOM = -96.0, 84.0, 105.0  # the heading tape is below the ball
+_BANK_RADIUS = 71.0
+_BANK_MARKS = ((0, 8.0), (10, 4.0), (20, 4.0), (30, 8.0), (45, 4.0), (60, 8.0))  # degrees, length
+_SLIP_Y, _SLIP_REACH, _SLIP_SCALE = 75.0, 26.0, 200.0  # units per g
+_TREND_S = 6.0  # the bar of the turn rate ends at the heading after this time
+_STANDARD_RATE = 3.0  # deg/s
+_DRIFT_SHOWN_KT = 5.0  # speed over the ground from which on its direction is shown
 _FAR = 3000.0
-_DIAL = (-136.0, 206.0)
-_DIAL_RADIUS = 76.0
 
 
 class Instruments:
@@ -63,7 +67,13 @@ class Instruments:
         """
         self._recording = recording
         self._updates = 0
+        self._shown: dict[str, tuple[float, ...]] = {}
         self._static("instruments/ball", _ball(), 0.0)
+        ground = LineArt()
+        middle = 0.5 * (_BALL_BOTTOM + _BOTTOM)
+        ground.line([[-_FAR, middle], [_FAR, middle]], PANEL, radius=middle - _BALL_BOTTOM)
+        self._static("instruments/heading_ground", ground, 0.4)
+        self._static("instruments/heading_tape", _heading_tape(), 0.5)
         self._static("instruments/columns", _columns(), 1.0)
         self._static("instruments/speed_tape", _tape(-40, 320, scale=_SPEED_SCALE, side=-1.0, step=10, labels=20), 2.0)
         self._static(
@@ -74,39 +84,64 @@ class Instruments:
 
     def update(self, row: FloatArray) -> None:
         """Show one row."""
-        shift = {
-            "ball": _PITCH_SCALE * float(row[COLUMN.pitch_deg]),
-            "speed_tape": _SPEED_SCALE * float(row[COLUMN.airspeed_kt]),
-            "altitude_tape": _ALTITUDE_SCALE * float(row[COLUMN.altitude_m]),
+        bank, pitch = math.radians(row[COLUMN.bank_deg]), _PITCH_SCALE * float(row[COLUMN.pitch_deg])
+        places = {
+            "ball": (pitch * math.sin(bank), pitch * math.cos(bank), -bank),
+            "speed_tape": (0.0, _SPEED_SCALE * float(row[COLUMN.airspeed_kt]), 0.0),
+            "altitude_tape": (0.0, _ALTITUDE_SCALE * float(row[COLUMN.altitude_m]), 0.0),
+            "heading_tape": (-_HEADING_SCALE * float(row[COLUMN.heading_deg]), 0.0, 0.0),
         }
-        for name, down in shift.items():
-            self._recording.log(f"instruments/{name}", rr.Transform3D(translation=[0.0, down, 0.0]))
+        rung = np.round(row[COLUMN.pitch_deg] / 5.0)
+        if np.isfinite(rung) and self._changed("ladder", rung):
+            self._recording.log("instruments/ball/ladder", _ladder(int(rung)).archetype(0.2))
+        for name, place in places.items():
+            if self._changed(name, *place):
+                x, y, turned = place
+                rotation = rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=turned) if turned else None
+                self._recording.log(f"instruments/{name}", rr.Transform3D(translation=[x, y, 0.0], rotation=rotation))
         bugs = LineArt()
         _draw_speed_limits(bugs, row)
         self._recording.log("instruments/bugs", bugs.archetype(3.0))
         moving = LineArt()
-        _draw_needle(moving, row)
-        _draw_controls(moving, row)
+        _draw_bank_and_slip(moving, row)
+        _draw_course(moving, row)
+        gauges.draw_moving(moving, row)
         self._recording.log("instruments/moving", moving.archetype(6.0))
         if self._updates % PICTURES_PER_TEXT == 0:
             text = LineArt()
             _draw_windows(text, row)
             _draw_annunciator(text, row)
-            _draw_numerals(text, row)
+            gauges.draw_numerals(text, row)
             self._recording.log("instruments/text", text.archetype(7.0))
         self._updates += 1
+
+    def _changed(self, name: str, *values: float) -> bool:
+        """Whether something is not as it was last shown."""
+        before = self._shown.get(name)
+        self._shown[name] = values
+        return before != values
 
     def _static(self, path: str, art: LineArt, order: float) -> None:
         self._recording.log(path, art.archetype(order), static=True)
 
 
 def _ball() -> LineArt:
-    """Sky, earth and pitch ladder around the horizon at y = 0."""
+    """Sky and earth around the horizon at y = 0."""
     art = LineArt()
     art.line([[-_FAR, -1500.0], [_FAR, -1500.0]], SKY, radius=1500.0)
     art.line([[-_FAR, 1500.0], [_FAR, 1500.0]], GROUND, radius=1500.0)
     art.line([[-_FAR, 0.0], [_FAR, 0.0]], WHITE, radius=-1.2)
-    for degrees in range(-60, 61, 5):
+    return art
+
+
+def _ladder(rung: int) -> LineArt:
+    """The rungs of the pitch ladder around one of them, few enough to be clear of the bank scale.
+
+    Args:
+        rung: Number of the rung nearest to the aircraft symbol, one every 5 degrees.
+    """
+    art = LineArt()
+    for degrees in range(5 * (rung - 2), 5 * (rung + 3), 5):
         y = -_PITCH_SCALE * degrees
         if degrees % 10 == 0 and degrees:
             art.line([[-26.0, y], [26.0, y]], WHITE, radius=-0.9)
@@ -139,6 +174,19 @@ def _tape(first: int, last: int, *, scale: float, side: float, step: int, labels
     return art
 
 
+def _heading_tape() -> LineArt:
+    """The compass as a strip; heading 0 is at x = 0, and it goes on beyond 0 and 360."""
+    art = LineArt()
+    for degrees in range(-40, 401, 5):
+        x, long = _HEADING_SCALE * degrees, degrees % 10 == 0
+        art.line([[x, _BOTTOM - (6.0 if long else 3.0)], [x, _BOTTOM]], DIM, radius=-0.7)
+        if degrees % 30 == 0:
+            quarter = {0: "N", 90: "E", 180: "S", 270: "W"}.get(degrees % 360)
+            words = quarter or f"{degrees % 360 // 10:02d}"
+            art.text(words, x, 92.5, height=8.5, colour=WHITE if quarter else TEXT, align="centre")
+    return art
+
+
 def _masks() -> LineArt:
     """Cover what the moving parts show outside their windows."""
     art = LineArt()
@@ -153,7 +201,8 @@ def _masks() -> LineArt:
 def _faces() -> LineArt:
     """Frames, the aircraft symbol and the faces of the lower instruments."""
     art = LineArt()
-    art.box(-_BALL_EDGE, _TOP, _BALL_EDGE, _BOTTOM, colour=FRAME)
+    art.box(-_BALL_EDGE, _TOP, _BALL_EDGE, _BALL_BOTTOM, colour=FRAME)
+    art.box(-_BALL_EDGE, _BALL_BOTTOM, _BALL_EDGE, _BOTTOM, colour=FRAME)
     for side in (-1.0, 1.0):
         art.box(side * _BALL_EDGE, _TOP, side * _TAPE_EDGE, _BOTTOM, colour=FRAME)
     for wing in ([[-58.0, 0.0], [-22.0, 0.0], [-22.0, 8.0]], [[58.0, 0.0], [22.0, 0.0], [22.0, 8.0]]):
@@ -166,24 +215,18 @@ def _faces() -> LineArt:
         art.bar(min(near, far), _TOP + 2.0, max(near, far), _TOP + 15.0, colour=PANEL)
     art.text("kn", -_TAPE_EDGE + 5.0, _TOP + 9.0, height=6.0, colour=DIM)
     art.text("alt m", _TAPE_EDGE - 5.0, _TOP + 9.0, height=6.0, colour=DIM, align="right")
-    _draw_dial_face(art)
+    for degrees, length in _BANK_MARKS:
+        for side in (-1.0, 1.0):
+            mark = [_on_arc(side * degrees, _BANK_RADIUS), _on_arc(side * degrees, _BANK_RADIUS + length)]
+            art.line(mark, BACKGROUND, radius=-2.0)
+            art.line(mark, WHITE, radius=-1.1)
+    art.bar(-_SLIP_REACH - 4.0, _SLIP_Y - 5.5, _SLIP_REACH + 4.0, _SLIP_Y + 5.5, colour=BACKGROUND)
+    for side in (-1.0, 1.0):
+        art.line([[side * 6.0, _SLIP_Y - 5.5], [side * 6.0, _SLIP_Y + 5.5]], DIM, radius=-0.9)
+        x = side * _STANDARD_RATE * _TREND_S * _HEADING_SCALE
+        art.line([[x, _BALL_BOTTOM], [x, _BALL_BOTTOM + 5.5]], WHITE, radius=-1.1)
+    gauges.draw_faces(art)
     return art
-
-
-def _draw_dial_face(art: LineArt) -> None:
-    """Quarter circle of the conversion angle: ahead is airplane mode, up is helicopter mode."""
-    art.line([_on_dial(angle, _DIAL_RADIUS) for angle in np.linspace(0.0, 95.0, 40)], FRAME, radius=-1.4)
-    for angle in range(0, 91, 5):
-        long = angle % 15 == 0
-        art.line(
-            [_on_dial(angle, _DIAL_RADIUS), _on_dial(angle, _DIAL_RADIUS - (8.0 if long else 4.0))], DIM, radius=-0.8
-        )
-        if angle % 30 == 0:
-            x, y = _on_dial(angle, _DIAL_RADIUS + 9.0)
-            art.text(str(angle), x, y, height=6.5, colour=DIM, align="centre")
-    for detent in (75.0, 50.0):
-        art.line([_on_dial(detent, _DIAL_RADIUS + 1.0), _on_dial(detent, _DIAL_RADIUS + 6.0)], AMBER, radius=-1.6)
-    art.text("nacelle", 6.0, 118.0, height=6.5, colour=DIM, align="right")
 
 
 def _draw_speed_limits(art: LineArt, row: FloatArray) -> None:
@@ -206,7 +249,7 @@ def _draw_speed_limits(art: LineArt, row: FloatArray) -> None:
 def _draw_windows(art: LineArt, row: FloatArray) -> None:
     """Large airspeed and altitude in the middle of their tapes, rates below."""
     for side, text, rate in (
-        (-1.0, f"{row[COLUMN.airspeed_kt]:.0f}", f"{row[COLUMN.airspeed_rate_kt_s]:+.1f} kn/s"),
+        (-1.0, f"{np.round(row[COLUMN.airspeed_kt]) + 0.0:.0f}", f"{row[COLUMN.airspeed_rate_kt_s]:+.1f} kn/s"),
         (1.0, f"{row[COLUMN.altitude_m]:.1f}", f"{row[COLUMN.climb_rate_m_s]:+.1f} m/s"),
     ):
         near, far = side * (_BALL_EDGE + 10.0), side * _TAPE_EDGE
@@ -216,10 +259,47 @@ def _draw_windows(art: LineArt, row: FloatArray) -> None:
         art.text(
             text, right - 4.0, 0.0, height=14.0 if len(text) < 5 else 12.0, colour=WHITE, align="right", weight=1.25
         )
-        art.bar(left + 5.0, 68.0, right - 5.0, 82.0, colour=BACKGROUND)
-        art.text(rate, 0.5 * (left + right), 75.0, height=6.5, colour=TEXT, align="centre")
-    art.bar(-40.0, _TOP + 3.0, 40.0, _TOP + 15.0, colour=BACKGROUND)  # as wide as the ladder, whose numbers it hides
-    art.text(f"pitch {row[COLUMN.pitch_deg]:+.1f}", 0.0, _TOP + 9.0, height=6.0, colour=WHITE, align="centre")
+        art.bar(left + 5.0, _BOTTOM - 16.0, right - 5.0, _BOTTOM - 2.0, colour=BACKGROUND)
+        art.text(rate, 0.5 * (left + right), _BOTTOM - 9.0, height=6.5, colour=TEXT, align="centre")
+    bank = float(row[COLUMN.bank_deg])
+    tilted = f"  bank {abs(bank):.0f} {'R' if bank > 0.0 else 'L'}" if abs(bank) >= 0.5 else ""
+    half = 58.0 if tilted else 34.0
+    art.bar(-half, _TOP + 3.0, half, _TOP + 15.0, colour=BACKGROUND)
+    words = f"pitch {row[COLUMN.pitch_deg]:+.1f}{tilted}"
+    art.text(words, 0.0, _TOP + 9.0, height=6.0, colour=WHITE, align="centre")
+    middle = 0.5 * (_BALL_BOTTOM + _BOTTOM) + 0.5
+    art.line([[-11.0, middle], [11.0, middle]], BACKGROUND, radius=8.5)
+    art.box(-19.0, middle - 9.0, 19.0, middle + 9.0, colour=WHITE)
+    heading = f"{np.round(row[COLUMN.heading_deg]) % 360.0:03.0f}"
+    art.text(heading, 0.0, middle, height=11.0, colour=WHITE, align="centre", weight=1.25)
+
+
+def _draw_bank_and_slip(art: LineArt, row: FloatArray) -> None:
+    """The pointer that the sky carries along the bank scale, and the ball in its tube."""
+    bank = float(row[COLUMN.bank_deg])
+    corners = (
+        (0.0, _BANK_RADIUS - 1.0),
+        (-4.5, _BANK_RADIUS - 9.0),
+        (4.5, _BANK_RADIUS - 9.0),
+        (0.0, _BANK_RADIUS - 1.0),
+    )
+    pointer = [_on_arc(offset - bank, radius) for offset, radius in corners]
+    art.line(pointer, BACKGROUND, radius=-2.4)
+    art.line(pointer, WHITE, radius=-1.4)
+    x = min(max(-_SLIP_SCALE * float(row[COLUMN.lateral_acceleration]), -_SLIP_REACH), _SLIP_REACH)
+    art.line([[x - 0.3, _SLIP_Y], [x + 0.3, _SLIP_Y]], WHITE, radius=4.2)
+
+
+def _draw_course(art: LineArt, row: FloatArray) -> None:
+    """On the heading tape: where the nose will be soon, and where the aircraft goes over the ground."""
+    edge = _BALL_EDGE - 3.0
+    trend = _HEADING_SCALE * _TREND_S * float(row[COLUMN.turn_rate_deg_s])
+    if abs(trend) > 0.5:
+        art.line([[0.0, _BALL_BOTTOM + 1.8], [min(max(trend, -edge), edge), _BALL_BOTTOM + 1.8]], GREEN, radius=1.3)
+    if abs(row[COLUMN.ground_speed_kt]) > _DRIFT_SHOWN_KT:
+        drift = (float(row[COLUMN.track_deg]) - float(row[COLUMN.heading_deg]) + 180.0) % 360.0 - 180.0
+        x, y = min(max(_HEADING_SCALE * drift, -edge), edge), _BOTTOM - 4.0
+        art.line([[x, y - 3.5], [x + 3.5, y], [x, y + 3.5], [x - 3.5, y], [x, y - 3.5]], GREEN, radius=-1.4)
 
 
 def _draw_annunciator(art: LineArt, row: FloatArray) -> None:
@@ -230,60 +310,7 @@ def _draw_annunciator(art: LineArt, row: FloatArray) -> None:
     art.text(words, 0.0, _BOTTOM + 13.0, height=9.5, colour=colour, align="centre", weight=1.2)
 
 
-def _draw_needle(art: LineArt, row: FloatArray) -> None:
-    nacelle, reference = float(row[COLUMN.nacelle_deg]), float(row[COLUMN.nacelle_reference_deg])
-    tip = _on_dial(nacelle, _DIAL_RADIUS - 12.0)
-    art.line([_DIAL, tip], WHITE, radius=2.2)
-    art.line([_on_dial(nacelle + 90.0, 16.0), _DIAL], WHITE, radius=1.2)
-    across = [_on_dial(nacelle, _DIAL_RADIUS - 16.0) + offset * _direction(nacelle + 90.0) for offset in (-20.0, 20.0)]
-    art.line(np.array(across), (*TEXT, 190), radius=1.3)
-    art.line([_on_dial(reference, _DIAL_RADIUS + 1.0), _on_dial(reference, _DIAL_RADIUS - 9.0)], CYAN, radius=1.4)
-
-
-def _draw_numerals(art: LineArt, row: FloatArray) -> None:
-    nacelle, reference = float(row[COLUMN.nacelle_deg]), float(row[COLUMN.nacelle_reference_deg])
-    art.text(f"{nacelle:.1f}\N{DEGREE SIGN}", 8.0, 133.0, height=13.0, colour=WHITE, align="right", weight=1.25)
-    art.text(f"ref {reference:.1f}\N{DEGREE SIGN}", 7.0, 149.0, height=6.5, colour=CYAN, align="right")
-    flapping = float(row[COLUMN.flapping_deg])
-    short = row[COLUMN.engine_power_shp] > row[COLUMN.engine_power_available_shp]
-    entries = (
-        ("flapping", f"{flapping:.1f}\N{DEGREE SIGN}", AMBER if flapping > 6.0 else WHITE),
-        ("power shp", f"{row[COLUMN.power_shp]:.0f}", AMBER if short else WHITE),
-        ("torque in lb", f"{row[COLUMN.mast_torque_inlb] / 1000.0:.0f} k", WHITE),
-        ("load factor", f"{row[COLUMN.load_factor]:.2f}", WHITE),
-    )
-    for index, (name, value, colour) in enumerate(entries):
-        y = 118.0 + 18.0 * index
-        art.text(name, 20.0, y, height=6.5, colour=DIM)
-        art.text(value, _TAPE_EDGE, y, height=11.0, colour=colour, align="right", weight=1.15)
-
-
-def _draw_controls(art: LineArt, row: FloatArray) -> None:
-    """Stick and lever as bars between their stops; what the hands ask for where protection gives something else."""
-    for y, name, value, asked, reason, low, high in (
-        (194.0, "stick", row[COLUMN.stick], row[COLUMN.pilot_stick], row[COLUMN.protection_stick_reason], -1.0, 1.0),
-        (212.0, "lever", row[COLUMN.lever], row[COLUMN.pilot_lever], row[COLUMN.protection_lever_reason], 0.0, 1.0),
-    ):
-        left, right = 78.0, _TAPE_EDGE
-        art.text(f"{name} prot" if reason else name, 10.0, y, height=6.5, colour=ACTING if reason else DIM)
-        art.box(left, y - 5.0, right, y + 5.0, colour=FRAME)
-        zero = left + (right - left) * (0.0 - low) / (high - low)
-        place = left + (right - left) * (min(max(value, low), high) - low) / (high - low)
-        stopped = value <= low or value >= high
-        if abs(place - zero) > 0.1:
-            art.line([[zero, y], [place, y]], RED if stopped else GREEN, radius=2.2)
-        art.line([[place, y - 5.0], [place, y + 5.0]], WHITE, radius=-1.5)
-        if reason:
-            hands = left + (right - left) * (min(max(asked, low), high) - low) / (high - low)
-            art.line([[place, y], [hands, y]], ACTING, radius=1.0)
-            art.line([[hands, y - 7.0], [hands, y + 7.0]], ACTING, radius=-1.5)
-
-
-def _direction(angle_deg: float) -> FloatArray:
-    """Where a nacelle angle points on the dial: 0 to the right, 90 up."""
+def _on_arc(angle_deg: float, radius: float) -> FloatArray:
+    """A point around the middle of the ball, clockwise from above it."""
     angle = math.radians(angle_deg)
-    return np.array([math.cos(angle), -math.sin(angle)])
-
-
-def _on_dial(angle_deg: float, radius: float) -> FloatArray:
-    return np.array(_DIAL) + radius * _direction(angle_deg)
+    return radius * np.array([math.sin(angle), -math.cos(angle)])

@@ -1,4 +1,4 @@
-"""The three-dimensional view: aircraft, rotors, ground and path, in NED metres from the point of departure."""
+"""The three-dimensional view: aircraft, rotors, ground, wind and path, in NED metres from the point of departure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import rerun as rr
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
 from telemetry.view import airframe
-from telemetry.view.colours import CYAN, LEFT_ROTOR, RIGHT_ROTOR, TRAIL
+from telemetry.view.colours import AMBER, CYAN, LEFT_ROTOR, RIGHT_ROTOR, TEXT, TRAIL, WIND
+from telemetry.view.strokes import LineArt
 
 SHOWN_TURNS_PER_SECOND = 0.45
 """Blades are shown this slowly: at 30 pictures a second 589 rpm would look like noise."""
@@ -23,6 +24,17 @@ GROUND_STEP = 50.0
 """Spacing of the ground's grid [m]."""
 SIDES = (("left", -1.0, LEFT_ROTOR), ("right", 1.0, RIGHT_ROTOR))
 """Name, sign of y and rotor colour of each side."""
+
+ROSE_RADIUS = 0.85
+"""Radius of the compass rose on the ground, in heights of the aircraft above it, so that it looks as large from all."""
+LEAST_ROSE = 18.0
+"""Its smallest radius [m]."""
+SHOWN_WIND = 0.5
+"""Wind that is shown from here on [m/s]."""
+SURFACE_STEP = 0.2
+"""Control surfaces are shown in steps of this, so that what hardly moves sends nothing [deg]."""
+FLAPERON_OF_FLAP = ((0.0, 20.0, 40.0, 75.0), (0.0, 12.5, 25.0, 47.0))
+"""Flap settings and the flaperons' droop there [deg], CR-166536."""
 
 _RUNWAY_LENGTH = 20_000.0
 _SNAP = 500.0
@@ -40,12 +52,19 @@ class Scene:
         self._recording = recording
         self._trail: list[list[float]] = []
         self._trail_time = -math.inf
+        self._kept: dict[str, tuple[float, ...]] = {}
         self._static("world", rr.ViewCoordinates.FRD)
         self._static("world/chase", rr.ViewCoordinates.FRD)
         for name, mesh in (("body", airframe.fuselage()), ("wing", airframe.wing()), ("tail", airframe.tail())):
             self._static(f"world/aircraft/{name}", _mesh(mesh))
+        self._surfaces = {"elevator": airframe.elevator()}
         for name, side, colour in SIDES:
             self._log_static_rotor(f"world/aircraft/nacelle_{name}", side, colour)
+            self._surfaces[f"flap_{name}"] = airframe.flap(side)
+            self._surfaces[f"flaperon_{name}"] = airframe.flaperon(side)
+            self._surfaces[f"rudder_{name}"] = airframe.rudder(side)
+        for name, surface in self._surfaces.items():
+            self._static(f"world/aircraft/{name}/mesh", _mesh(surface.mesh))
         self._log_ground()
 
     def update(self, row: FloatArray, *, trail: bool = True) -> None:
@@ -55,32 +74,70 @@ class Scene:
             trail: The place is part of the path.
         """
         time_s, nacelle = float(row[COLUMN.time_s]), math.radians(row[COLUMN.nacelle_deg])
-        position = [float(row[COLUMN.distance_m]), 0.0, -float(row[COLUMN.altitude_m])]
-        pitch = math.radians(row[COLUMN.pitch_deg])
-        self._log("world/chase", rr.Transform3D(translation=position))
-        self._log("world/aircraft", rr.Transform3D(translation=position, quaternion=_quaternion(_about_y(pitch))))
-        forward = math.radians(row[COLUMN.longitudinal_flapping_deg])
-        sideways = math.radians(row[COLUMN.lateral_flapping_deg])
+        position = place_of(row)
+        heading = _about_z(math.radians(row[COLUMN.heading_deg]))
+        self._log("world/chase", rr.Transform3D(translation=position, quaternion=_quaternion(heading)))
+        self._log("world/aircraft", rr.Transform3D(translation=position, quaternion=_quaternion(attitude_of(row))))
         azimuth = 2.0 * math.pi * ((SHOWN_TURNS_PER_SECOND * time_s) % 1.0)
         for name, side, _ in SIDES:
             path = f"world/aircraft/nacelle_{name}"
             pivot = airframe.PIVOT * [1.0, side, 1.0]
             self._log(path, rr.Transform3D(translation=pivot, quaternion=_quaternion(_about_y(nacelle))))
-            # Positive flapping tilts the disc from the mast (+x) to what is ahead in helicopter mode (+z).
-            hub = _product(_about_y(-forward), _about_z(side * sideways))
-            self._log(
-                f"{path}/hub", rr.Transform3D(translation=[airframe.MAST_LENGTH, 0.0, 0.0], quaternion=_quaternion(hub))
-            )
-            self._log(f"{path}/hub/blades", rr.Transform3D(quaternion=_quaternion(_about_x(-side * azimuth))))
-        snapped = _SNAP * math.floor(position[0] / _SNAP)
-        self._log("world/ground", rr.Transform3D(translation=[snapped, 0.0, 0.0]))
+            hub = _quaternion(hub_of(row, side))
+            self._log(f"{path}/hub", rr.Transform3D(translation=[airframe.MAST_LENGTH, 0.0, 0.0], quaternion=hub))
+            self._log(f"{path}/hub/blades", rr.Transform3D(quaternion=_quaternion(_about_x(side * azimuth))))
+        self._move_surfaces(row)
+        self._move_ground(row, position, departure=trail)
         self._log(
-            "world/height", rr.LineStrips3D([[position, [position[0], 0.0, 0.0]]], colors=[(*CYAN, 90)], radii=[-0.7])
+            "world/height",
+            rr.LineStrips3D([[position, [*position[:2], 0.0]]], colors=[(*CYAN, 90)], radii=[-0.7]),
         )
         if trail and time_s - self._trail_time >= 0.5:
             self._trail_time = time_s
             self._trail = [*self._trail[1 - TRAIL_POINTS :], position]
-            self._log("world/trail", rr.LineStrips3D([self._trail], colors=[TRAIL], radii=[-1.5]))
+            track = [[north, east, -0.2] for north, east, _ in self._trail]
+            self._log(
+                "world/trail",
+                rr.LineStrips3D([self._trail, track], colors=[TRAIL, (*TRAIL, 110)], radii=[-1.5, -1.0]),
+            )
+
+    def _move_surfaces(self, row: FloatArray) -> None:
+        for name, angle in surface_angles(row).items():
+            shown = SURFACE_STEP * float(np.round(angle / SURFACE_STEP))
+            if self._changed(name, shown):
+                surface = self._surfaces[name]
+                turned = _quaternion(_about(surface.axis, math.radians(shown)))
+                self._log(f"world/aircraft/{name}", rr.Transform3D(translation=surface.place, quaternion=turned))
+
+    def _move_ground(self, row: FloatArray, position: list[float], *, departure: bool) -> None:
+        """Take plain, compass rose and wind arrow along; lay the runway along the heading of the departure."""
+        if departure and "runway" not in self._kept:
+            self._changed("runway")
+            ahead = _about_z(math.radians(row[COLUMN.heading_deg]))
+            self._log("world/runway", rr.Transform3D(quaternion=_quaternion(ahead)))
+        snapped = [_SNAP * math.floor(place / _SNAP) for place in position[:2]]
+        if self._changed("ground", *snapped):
+            self._log("world/ground", rr.Transform3D(translation=[*snapped, 0.0]))
+        size = max(LEAST_ROSE, -ROSE_RADIUS * position[2])
+        self._log("world/rose", rr.Transform3D(translation=[*position[:2], 0.0], scale=size))
+        north, east = float(row[COLUMN.wind_north_m_s]), float(row[COLUMN.wind_east_m_s])
+        if math.hypot(north, east) >= SHOWN_WIND:
+            # Past the aircraft's tail fins, as a wind-sock would hang, a second of its way long.
+            blown = 0.5 * np.array([north, east, 0.0])
+            above = np.array([*position[:2], position[2] - 6.5])
+            self._changed("wind")
+            self._log(
+                "world/wind",
+                rr.Arrows3D(vectors=[blown], origins=[above - 0.5 * blown], colors=[WIND], radii=[0.11]),
+            )
+        elif self._kept.pop("wind", None) is not None:
+            self._log("world/wind", rr.Clear(recursive=False))
+
+    def _changed(self, name: str, *values: float) -> bool:
+        """Whether something is elsewhere than when this was last asked."""
+        before = self._kept.get(name)
+        self._kept[name] = values
+        return before != values
 
     def _log_static_rotor(self, path: str, side: float, colour: airframe.Colour) -> None:
         self._static(f"{path}/pod", _mesh(airframe.nacelle()))
@@ -92,7 +149,7 @@ class Scene:
         self._static(f"{path}/square", rr.LineStrips3D([square], colors=[(220, 225, 232, 120)], radii=[-0.5]))
 
     def _log_ground(self) -> None:
-        """A plain that moves along in steps of its own pattern, and a marked runway that stands still."""
+        """A plain that moves along in steps of its own pattern, a compass rose, and a runway that stands still."""
         reach, width = 4000.0, 1500.0
         plain = _rectangle(-reach, reach, 4.0 * width, 0.4)
         self._static("world/ground/plain", rr.Mesh3D(**plain, albedo_factor=(58, 74, 58, 255)))
@@ -100,6 +157,7 @@ class Scene:
             [[-1500.0, y, 0.0], [1500.0, y, 0.0]] for y in np.arange(-width, width + GROUND_STEP, GROUND_STEP)
         ]
         self._static("world/ground/grid", rr.LineStrips3D(lines, colors=[(84, 102, 84)], radii=[0.3]))
+        self._static("world/rose/marks", compass_rose())
         runway = _rectangle(-150.0, _RUNWAY_LENGTH, 15.0, 0.1)
         self._static("world/runway", rr.Mesh3D(**runway, albedo_factor=(70, 74, 82, 255)))
         dashes = [[[x, 0.0, -0.1], [x + 30.0, 0.0, -0.1]] for x in np.arange(0.0, _RUNWAY_LENGTH, 60.0)]
@@ -108,7 +166,7 @@ class Scene:
             "world/runway/marks",
             rr.LineStrips3D([*dashes, *edges], colors=[(225, 228, 232)], radii=[0.45] * len(dashes) + [0.25] * 2),
         )
-        posts = np.arange(0.0, _RUNWAY_LENGTH, 1000.0)
+        posts = np.arange(1000.0, _RUNWAY_LENGTH, 1000.0)
         self._static(
             "world/runway/posts",
             rr.LineStrips3D(
@@ -123,6 +181,65 @@ class Scene:
 
     def _static(self, path: str, archetype: Any) -> None:
         self._recording.log(path, archetype, static=True)
+
+
+def place_of(row: FloatArray) -> list[float]:
+    """Where the aircraft is: north, east, down [m]."""
+    return [float(row[COLUMN.north_m]), float(row[COLUMN.east_m]), -float(row[COLUMN.altitude_m])]
+
+
+def attitude_of(row: FloatArray) -> list[float]:
+    """Body to north, east, down as a quaternion x y z w: heading, then pitch, then bank."""
+    bank, pitch, heading = (
+        math.radians(row[column]) for column in (COLUMN.bank_deg, COLUMN.pitch_deg, COLUMN.heading_deg)
+    )
+    return _product(_about_z(heading), _product(_about_y(pitch), _about_x(bank)))
+
+
+def hub_of(row: FloatArray, side: float) -> list[float]:
+    """One rotor's disc to its nacelle as a quaternion x y z w.
+
+    Positive flapping tilts the disc from the mast (+x) to what is ahead in helicopter mode (+z), and inboard.
+
+    Args:
+        side: 1 right, -1 left.
+    """
+    forward = math.radians(
+        row[COLUMN.longitudinal_flapping_deg] + side * row[COLUMN.differential_longitudinal_flapping_deg]
+    )
+    inboard = math.radians(row[COLUMN.lateral_flapping_deg] + side * row[COLUMN.differential_lateral_flapping_deg])
+    return _product(_about_y(-forward), _about_z(-side * inboard))
+
+
+def surface_angles(row: FloatArray) -> dict[str, float]:
+    """How far each control surface is turned about its hinge [deg]: trailing edge down, or to the right."""
+    droop = float(np.interp(row[COLUMN.flap_deg], *FLAPERON_OF_FLAP))
+    angles = {"elevator": float(row[COLUMN.elevator_deg])}
+    for name, side, _ in SIDES:
+        angles[f"flap_{name}"] = float(row[COLUMN.flap_deg])
+        angles[f"flaperon_{name}"] = droop - side * float(row[COLUMN.aileron_deg])
+        angles[f"rudder_{name}"] = float(row[COLUMN.rudder_deg])
+    return angles
+
+
+def compass_rose() -> Any:
+    """A ring of radius 1 on the ground with marks every 30 degrees and the letters of the four quarters."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)
+    strips = [np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], 1)]
+    colours: list[Any] = [TEXT]
+    for degrees in range(0, 360, 30):
+        outward = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
+        strips.append(np.array([outward, 1.07 * outward]))
+        colours.append(TEXT)
+    for letter, degrees in (("N", 0), ("E", 90), ("S", 180), ("W", 270)):
+        art = LineArt()
+        art.text(letter, 0.0, 0.0, height=0.22, colour=TEXT, align="centre")
+        outward = np.array([math.cos(math.radians(degrees)), math.sin(math.radians(degrees)), 0.0])
+        right = np.array([-outward[1], outward[0], 0.0])
+        for strip in art.strips:  # x right, y down the page: read with its quarter ahead
+            strips.append(1.24 * outward + np.outer(strip[:, 0], right) - np.outer(strip[:, 1], outward))
+            colours.append(AMBER if letter == "N" else TEXT)
+    return rr.LineStrips3D(strips, colors=colours, radii=[-1.1])
 
 
 def _mesh(mesh: airframe.Mesh) -> Any:
@@ -170,6 +287,11 @@ def _about_y(angle: float) -> list[float]:
 
 def _about_z(angle: float) -> list[float]:
     return [0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)]
+
+
+def _about(axis: FloatArray, angle: float) -> list[float]:
+    x, y, z = math.sin(0.5 * angle) * axis
+    return [x, y, z, math.cos(0.5 * angle)]
 
 
 def _product(a: list[float], b: list[float]) -> list[float]:

@@ -18,6 +18,7 @@ from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.blueprint import blueprint
 from telemetry.view.corridor import CorridorPlot
+from telemetry.view.ground_map import GroundMap
 from telemetry.view.instruments import Instruments
 from telemetry.view.options import ViewOptions
 from telemetry.view.plots import Plots, history_of, set_row_time
@@ -174,6 +175,7 @@ class Streamer:
         self._scene = Scene(recording)
         self._corridor = CorridorPlot(recording, self._outline)
         self._instruments = Instruments(recording)
+        self._map = GroundMap(recording)
         self._plots = Plots(recording)
         recording.send_blueprint(blueprint(self._options.layout))
         # What is seen until the first row comes, which overwrites it: a helicopter at rest.
@@ -184,12 +186,13 @@ class Streamer:
         self._last_time = -math.inf
 
     def _draw(self, row: FloatArray) -> None:
-        """Pose, instruments and corridor at one row."""
+        """Pose, instruments, corridor and map at one row."""
         signals = history_of(row)
         set_row_time(self._recording, signals)
         self._scene.update(signals)
         self._instruments.update(signals)
         self._corridor.update(signals)
+        self._map.update(signals)
 
     def _end_run(self) -> None:
         self._send_plots()

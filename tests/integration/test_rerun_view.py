@@ -51,7 +51,7 @@ def rows_of_a_conversion(seconds: float) -> np.ndarray:
     rows[:, COLUMN.altitude_m] = 100.0
     rows[:, COLUMN.pitch_deg] = 5.0 * np.sin(time_s)
     rows[:, COLUMN.longitudinal_flapping_deg] = 4.0
-    rows[:, COLUMN.distance_m] = 40.0 * time_s
+    rows[:, COLUMN.north_m] = 40.0 * time_s
     rows[:, COLUMN.margin_low_kt] = rows[:, COLUMN.margin_kt] = np.where(share > 0.5, 3.0, 30.0)
     rows[:, COLUMN.margin_high_kt] = 60.0
     rows[:, COLUMN.corridor_level] = np.where(share > 0.5, 2.0, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import pty
 import socket
@@ -317,7 +318,7 @@ def test_the_picture_says_what_matters():
     view = VehicleView()
     console.print(picture(Controls(), view, device="Pad", rate_hz=50.0))
     view.system_id, view.heard, view.custom_mode = 1, time.monotonic(), 0x00070000
-    view.values |= {"nac_deg": 75.0, "airspeed_kt": 80.0}
+    view.values |= {"nac_deg": 75.0, "airspeed_kt": 80.0, "bank_deg": -12.0, "heading_deg": 270.0}
     view.texts = ["Corridor clear"]
     console.print(picture(Controls(stick=0.5), view, device="Pad", rate_hz=50.0))
     view.heard = 0.0
@@ -329,6 +330,8 @@ def test_the_picture_says_what_matters():
         "Stabilized",
         "nacelle 75.0 deg",
         "airspeed 80 kn",
+        "bank -12 deg",
+        "heading 270 deg",
         "Corridor clear",
         "silent",
     ):
@@ -386,6 +389,16 @@ def test_the_sender_finds_any_vehicle_and_flies_it(air):
     assert (command.command, command.param1, command.target_system) == (400, 0.0, 7)  # it was armed
     assert (parameter.param_id, parameter.param_value) == ("XV_RESET", 1.0)
     assert (sticks.target, sticks.x, sticks.z, sticks.buttons) == (7, -500, 250, 1 << 5)
+
+
+def test_the_sender_keeps_the_attitude_in_degrees(air):
+    sender, vehicle = air
+    vehicle.send(BEAT)
+    sender.poll()
+    vehicle.send(dialect.MAVLink_attitude_message(1, math.radians(-12.0), 0.1, -math.pi / 2.0, 0.0, 0.0, 0.0))
+    sender.poll()
+    assert sender.vehicle.values["bank_deg"] == pytest.approx(-12.0, abs=1e-4)
+    assert sender.vehicle.values["heading_deg"] == pytest.approx(270.0, abs=1e-4)
 
 
 def test_the_sender_waits_for_the_lever_as_long_as_it_takes(air, monkeypatch):

@@ -15,7 +15,7 @@ from rtsim.arrays import FloatArray
 from rtsim.errors import InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from telemetry.exchange.ring import TIMING_COUNT
-from telemetry.log import flight_plots
+from telemetry.log import flight_plots, track_plot
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.log.flight_plots import plot_flight
 from telemetry.log.format import FlightMetadata
@@ -106,6 +106,57 @@ def test_lateral_stick_and_pedals_are_drawn_where_they_were_used(tmp_path: Path,
     if moved:
         assert titles[-2:] == ["Lateral stick, 1 is full right", "Pedals, 1 is full right"]
         assert figure.axes[-1].get_ylabel() == "share of travel"
+
+
+def turn(rows: FloatArray) -> None:
+    """A right turn at 10 deg/s and 20 m/s from north, on through north again, in an east wind."""
+    time = rows[:, COLUMN.time_s]
+    heading = np.radians(350.0 + 10.0 * time)
+    rows[:, COLUMN.heading_deg] = rows[:, COLUMN.track_deg] = np.degrees(heading) % 360.0
+    rows[:, COLUMN.turn_rate_deg_s], rows[:, COLUMN.bank_deg] = 10.0, 19.0
+    rows[:, COLUMN.north_m] = 20.0 / np.radians(10.0) * (np.sin(heading) - np.sin(heading[0]))
+    rows[:, COLUMN.east_m] = -20.0 / np.radians(10.0) * (np.cos(heading) - np.cos(heading[0]))
+    rows[:, COLUMN.wind_east_m_s] = -5.0
+    rows[:, COLUMN.flapping_right_deg], rows[:, COLUMN.mast_torque_left_inlb] = 3.0, 7e4
+
+
+def test_a_turn_is_drawn_from_above_with_headings_and_wind(tmp_path: Path) -> None:
+    log = record(tmp_path / "flight.parquet", 500, timed=False, change=turn)
+    assert [name for name, _, _ in flight_plots._pictures(log)][-2:] == ["track", "course"]
+    figure = Figure()
+    track_plot.draw_track(log, figure)
+    axes = figure.axes[0]
+    track, *planes = (line.get_xydata() for line in axes.get_lines())
+    assert np.array_equal(track, np.stack([log["east_m"], log["north_m"]], 1))
+    assert axes.get_xlim()[0] < track[:, 0].min()
+    assert axes.get_ylim()[1] > track[:, 1].max()
+    bodies = planes[::3]
+    marks = [text.get_text() for text in axes.texts if text.get_text().endswith(" s")]
+    assert len(bodies) == len(marks) == 5
+    for body, second in zip(bodies, (0.0, 2.0, 4.0, 6.0, 8.0), strict=True):
+        east, north = body[1] - body[0]
+        assert np.degrees(np.arctan2(east, north)) % 360.0 == pytest.approx((350.0 + 10.0 * second) % 360.0, abs=0.5)
+    assert axes.texts[-1].get_text() == "wind 090/10 kn"
+
+
+def test_the_heading_has_no_line_across_the_plot_at_north(tmp_path: Path) -> None:
+    log = record(tmp_path / "flight.parquet", 500, timed=False, change=turn)
+    figure = Figure()
+    flight_plots._draw_panels(log, figure, flight_plots._COURSE)
+    heading = figure.axes[1].get_lines()[0].get_ydata()
+    assert np.isnan(heading).sum() == 1
+    assert np.nanmax(np.abs(np.diff(heading))) < 1.0
+
+
+def test_both_rotors_are_drawn_where_they_differ(tmp_path: Path) -> None:
+    for name, change, panels in (("turn", turn, 5), ("straight", None, 4)):
+        figure = Figure()
+        flight_plots._draw_rotors(record(tmp_path / f"{name}.parquet", 60, timed=False, change=change), figure)
+        assert len(figure.axes) == panels
+        shown = {str(line.get_label()): line.get_ydata()[0] for axes in figure.axes for line in axes.get_lines()}
+        if change is not None:
+            assert shown["flapping right"] == 3.0
+            assert shown["mast torque left"] == 7e4
 
 
 def test_marks_that_would_cover_one_another_become_one(tmp_path: Path) -> None:
