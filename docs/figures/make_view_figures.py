@@ -14,7 +14,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 from rerun.experimental import ViewerClient
 
 import scenarios
@@ -84,12 +83,8 @@ def free_port() -> int:
 
 
 def shoot(port: int, name: str) -> None:
-    """Save what a viewer shows, in few enough colours to be small."""
-    place = HERE / f"{name}.png"
-    ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(place))
-    with Image.open(place) as picture:
-        small = picture.convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-    small.save(place, optimize=True)
+    """Save what a viewer shows."""
+    ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy").save_screenshot(str(HERE / f"{name}.png"))
 
 
 def take(name: str) -> None:
