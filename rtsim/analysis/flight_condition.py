@@ -248,7 +248,9 @@ def nonlinear_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     rotor_speed = tables.configuration.rotor_speed if condition.rotor_speed is None else condition.rotor_speed
     values = named(point, ALL_STATES, ALL_INPUTS, ALL_OUTPUTS)
     configuration = (to_deg(flap), to_rpm(float(rotor_speed)))
-    return trim_result(request, xv15_profile(), values, configuration, point.converged, _thinner(request)), point
+    where = (request.airspeed_kt, request.nacelle_deg)
+    thinner = _thinner(request)
+    return trim_result(where, "nonlinear", xv15_profile(), values, configuration, point.converged, thinner), point
 
 
 def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
@@ -269,7 +271,9 @@ def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
     flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
     values = named(point, database.states, database.inputs, database.outputs)
     configuration = (to_deg(flap), to_rpm(database.governed_speed))
-    return trim_result(request, database.profile, values, configuration, point.converged, _thinner(request)), point
+    where = (request.airspeed_kt, request.nacelle_deg)
+    thinner = _thinner(request)
+    return trim_result(where, "database", database.profile, values, configuration, point.converged, thinner), point
 
 
 def solvable(request: AskedCondition) -> AskedCondition:

@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from rtsim.aircraft.points import TrimPoint
     from rtsim.aircraft.profile import AircraftProfile
     from rtsim.aircraft.variables import Variable
-    from rtsim.analysis.flight_condition import AskedCondition
 
 TRAVELS = {"lateral_stick_in": "lateral_stick_travel_in", "pedal_in": "pedal_travel_in"}
 """Half travel of lateral stick and pedals, by their JSON keys."""
@@ -61,7 +60,8 @@ def named(
 
 
 def trim_result(
-    request: AskedCondition,
+    where: tuple[float, float],
+    source: str,
     profile: AircraftProfile,
     values: dict[str, float],
     configuration: tuple[float, float],
@@ -71,7 +71,8 @@ def trim_result(
     """The answer.
 
     Args:
-        request: What was asked for.
+        where: Airspeed [kn] and nacelle angle [deg] asked for.
+        source: What answers: ``nonlinear`` or ``database``.
         profile: The aircraft.
         values: From ``named``.
         configuration: Flaps [deg], rotor speed [rpm].
@@ -99,16 +100,16 @@ def trim_result(
         **_lateral_result(values),
     }
     return {
-        "airspeed_kt": request.airspeed_kt,
-        "nacelle_deg": request.nacelle_deg,
+        "airspeed_kt": where[0],
+        "nacelle_deg": where[1],
         "flap_deg": flap_deg,
         "rotor_rpm": rotor_rpm,
         # where nothing was solved, the last iterate is no answer
         **(solved if converged else dict.fromkeys(solved)),
         "converged": converged,
         "beyond_limits": _beyond_limits(solved, profile) if converged else [],
-        "inside_corridor": corridor.inside(kt(request.airspeed_kt), deg(request.nacelle_deg)),
-        "source": "nonlinear" if request.solves_nonlinear else "database",
+        "inside_corridor": corridor.inside(kt(where[0]), deg(where[1])),
+        "source": source,
     }
 
 

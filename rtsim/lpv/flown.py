@@ -21,7 +21,7 @@ from rtsim.aircraft.variables import (
 )
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.lpv.database import Database
+from rtsim.lpv.database import Database, StoredArrays
 
 
 @functools.lru_cache(maxsize=4)
@@ -45,16 +45,13 @@ def flown_database(database: Database, file: str | None = None) -> Database:
     pairs = ((database.states, STATES), (database.inputs, INPUTS), (database.outputs, OUTPUTS))
     if all([v.name for v in have] == [v.name for v in want] for have, want in pairs):
         return database
-    if database.lateral is not None:
-        raise InputError(
-            "its variables are not in the order of the closed loop, which one with a lateral half must keep",
-            file=file, key="states, inputs, outputs", mend="write it as the shipped one is (rtsim model export)",
-        )  # fmt: skip
     x, u, y = (np.array([position(have, variable.name) for variable in want]) for have, want in pairs)
 
     def pick(name: str, *places: Any) -> FloatArray:
         """An array with its last axes in the closed loop's order; zeros where a variable is missing."""
-        array = getattr(database, name)
+        return ordered(getattr(database, name), places)
+
+    def ordered(array: FloatArray, places: Sequence[Any]) -> FloatArray:
         for axis, place in enumerate(places, start=array.ndim - len(places)):
             array = np.take(array, np.maximum(place, 0), axis=axis)
             missing = [slice(None)] * array.ndim
@@ -62,6 +59,24 @@ def flown_database(database: Database, file: str | None = None) -> Database:
             array[tuple(missing)] = 0.0
         return np.asarray(array)
 
+    lateral = {} if database.lateral is None else dict(database.lateral.arrays)
+    axes = {
+        "x_ref": (x,),
+        "u_ref": (u,),
+        "y_ref": (y,),
+        "xdot_ref": (x,),
+        "A": (x, x),
+        "B": (x, u),
+        "C": (y, x),
+        "D": (y, u),
+    }
+    for name, places in axes.items():
+        if f"loaded_{name}" in lateral:
+            lateral[f"loaded_{name}"] = ordered(lateral[f"loaded_{name}"], places)
+        if f"slip_{name}" in lateral:
+            array, count = lateral[f"slip_{name}"], {"x": database.states, "u": database.inputs, "y": database.outputs}
+            split = len(count[name[0]])
+            lateral[f"slip_{name}"] = np.concatenate([ordered(array[..., :split], places), array[..., split:]], axis=-1)
     return replace(
         database,
         states=STATES,
@@ -76,6 +91,7 @@ def flown_database(database: Database, file: str | None = None) -> Database:
         B=pick("B", x, u),
         C=pick("C", y, x),
         D=pick("D", y, u),
+        lateral=None if database.lateral is None else StoredArrays(lateral, database.lateral.attributes),
     )
 
 

@@ -128,7 +128,10 @@ def test_held_controls_stay_where_they_acted_last() -> None:
 
 @pytest.mark.parametrize("to", ["mocm", "external"])
 def test_who_takes_over_makes_no_step(to: str) -> None:
-    """What acted fades into what the next pilot gives; the same again from a snapshot in between."""
+    """What acted fades into what the next pilot gives; the same again from a snapshot in between.
+
+    The virtual pilot's own first output is what acted; from there his feet move no faster than 4 travels a second.
+    """
     simulation = Simulation(hover())
     simulation.set_pilot("external")
     simulation.run(1)
@@ -144,16 +147,17 @@ def test_who_takes_over_makes_no_step(to: str) -> None:
     rows = fly(100)
     snapshot = simulation.snapshot()
     rows = np.vstack([rows, fly(1400)])
-    assert np.abs(np.diff(np.vstack([before, rows[:, BOTH]]), axis=0)).max() <= 0.01
-    np.testing.assert_array_equal(rows[:, PILOT_BOTH], np.tile(wanted, (1500, 1)))
-    np.testing.assert_allclose(rows[-1, BOTH], wanted, atol=2e-3)
+    assert np.abs(np.diff(np.vstack([before, rows[:, BOTH]]), axis=0)).max() <= (0.017 if to == "mocm" else 0.01)
+    if to == "external":
+        np.testing.assert_array_equal(rows[:, PILOT_BOTH], np.tile(wanted, (1500, 1)))
+    np.testing.assert_allclose(rows[-1, BOTH], wanted, atol=0.03 if to == "mocm" else 2e-3)
     simulation.restore(snapshot)
     np.testing.assert_array_equal(fly(1400), rows[100:])
 
 
 @pytest.mark.parametrize("plant", ["lpv", "lpv-plain", "nonlinear"])
 def test_a_script_moves_both_and_the_symmetric_flight_stays_as_it_is(plant: str) -> None:
-    """Step, doublet, sine; an aircraft that does not roll flies as if nobody had moved anything."""
+    """Step, doublet, sine, upon what the pilot gives; an aircraft that does not roll flies as if nobody had moved."""
     pulses = (
         Pulse(channel="lateral_stick", start=0.1, duration=0.2, amount=0.3),
         Pulse(channel="pedal", start=0.1, duration=0.2, amount=1.4, shape="doublet"),
@@ -163,10 +167,10 @@ def test_a_script_moves_both_and_the_symmetric_flight_stays_as_it_is(plant: str)
     rows = simulation.run(250)
     time, lateral, pedal = rows[:, COLUMN.time_s], rows[:, COLUMN.lateral_stick], rows[:, COLUMN.pedal]
     first = (time >= 0.1) & (time < 0.3)
-    assert set(lateral[first]) == {0.3}
-    assert set(pedal[first]) == {1.0, -1.0}
+    np.testing.assert_allclose(lateral[first], 0.3, atol=0.05)
+    assert {1.0, -1.0} <= set(pedal[first])
     assert np.ptp(lateral[time >= 0.6]) > 0.35
-    assert not lateral[(time > 0.3) & (time < 0.6)].any()
+    assert np.abs(lateral[(time > 0.3) & (time < 0.6)]).max() < 0.4
     if simulation.tables.plant.lateral == 0:
         straight = Simulation(hover(plant=plant)).run(250)
         straight[:, COLUMN.control_on_stop] = rows[:, COLUMN.control_on_stop]
@@ -238,7 +242,7 @@ def test_scripts_and_hand_overs_are_replayed_bit_by_bit(tmp_path: Path) -> None:
     flight = scenarios.fly(str(scenario), speed="max", outputs=FlightOutputs(log=log))
     lateral = flight["lateral_stick"]
     assert lateral[200] == 0.4
-    assert 0.0 < lateral[500] < lateral[376]
+    assert np.abs(np.diff(lateral[370:500])).max() < 0.017
     assert np.ptp(flight["pedal"][500:]) > 0.1
     result = replay_log(log)
     assert result.same

@@ -245,9 +245,9 @@ def test_lateral_stick_and_pedals_fly(flight):
     flight.session.switch_pilot("external", by_hand=True)
     back = fly(flight, 100)
     steps = np.diff(np.vstack((rows[-1:], taken, back))[:, lateral], axis=0)
-    assert np.abs(steps).max() <= 0.01
+    assert np.abs(steps).max() <= 0.017  # the virtual pilot's feet: 4 travels a second
     assert int(flight.link.reports[-1].waiting) & 12 == 12  # hand and feet are elsewhere
-    assert np.abs(back[-1, lateral]).max() < 0.25
+    assert np.abs(back[-1, lateral]).max() < 0.3
 
 
 def test_a_hand_on_the_pedals_alone_takes_the_controls(flight):
