@@ -20,13 +20,28 @@ FaultKind = Literal[
     "airspeed-bias",
     "airspeed-frozen",
     "engine-limit",
+    "control-jammed",
 ]
-Actuator = Literal["collective", "cyclic", "elevator"]
+Actuator = Literal[
+    "collective",
+    "cyclic",
+    "elevator",
+    "collective-right",
+    "collective-left",
+    "cyclic-right",
+    "cyclic-left",
+    "aileron",
+    "rudder",
+]
+Control = Literal["stick", "lever", "lateral-stick", "pedal"]
 Stop = Literal["low", "high"]
 EngineRating = Literal["contingency", "takeoff", "military", "normal"]
 
-ACTUATORS: tuple[Actuator, ...] = ("collective", "cyclic", "elevator")
-"""Actuators that can fail, in the order of the aircraft's states."""
+ACTUATORS: tuple[Actuator, ...] = get_args(Actuator)
+"""Actuators that can fail, in the order of the kernels: those that act on both sides alike first."""
+CONTROLS: tuple[Control, ...] = get_args(Control)
+"""Controls in the cockpit that can jam."""
+_LATERAL = {*ACTUATORS[3:], "lateral-stick", "pedal"}
 LARGEST_POWER = 1e7
 """Largest power left to a failing engine [W]; what the aircraft's engine gives at most counts besides."""
 
@@ -64,6 +79,8 @@ class Fault:
     """When it mends [s]; None: never."""
     actuator: Actuator | None = None
     """Which actuator (``actuator-...``)."""
+    control: Control | None = None
+    """Which control in the cockpit stands where it last was (``control-jammed``), whoever moves it."""
     rate: float | None = None
     """Fastest motion left (``nacelle-slow``, ``actuator-slow``), or the rate of an ``actuator-hard-over`` [rad/s]."""
     stop: Stop | None = None
@@ -84,6 +101,7 @@ class Fault:
         _choice("other_engine", self.other_engine, get_args(EngineRating))
         needed = {
             "actuator": self.kind.startswith("actuator"),
+            "control": self.kind == "control-jammed",
             "rate": self.kind in {"nacelle-slow", "actuator-slow"},
             "stop": self.kind == "actuator-hard-over",
             "bias": self.kind == "airspeed-bias",
@@ -100,6 +118,8 @@ class Fault:
     def _check_values(self) -> None:
         if self.actuator is not None:
             _choice("actuator", self.actuator, ACTUATORS)
+        if self.control is not None:
+            _choice("control", self.control, CONTROLS)
         if self.stop is not None:
             _choice("stop", self.stop, ("low", "high"))
         if self.rate is not None:
@@ -113,7 +133,13 @@ class Fault:
     @property
     def name(self) -> str:
         """The failure in one word, as in the event log: ``cyclic-stuck``, ``nacelle-jammed``."""
-        return self.kind if self.actuator is None else self.kind.replace("actuator", self.actuator, 1)
+        part = self.actuator or self.control
+        return self.kind if part is None else f"{part}-{self.kind.partition('-')[2]}"
+
+    @property
+    def leaves_symmetry(self) -> bool:
+        """Whether it acts on what moves the aircraft out of its plane of symmetry."""
+        return bool({self.actuator, self.control} & _LATERAL)
 
     def size(self, profile: AircraftProfile | None = None) -> float:
         """Its size: rate [rad/s], bias [m/s], shaft power available [W], -1 or 1 for a stop; 0 where there is none.
@@ -134,6 +160,25 @@ class Fault:
             if number is not None:
                 return number
         return 0.0
+
+
+def check_sides(fault: Fault, *, rolls: bool) -> None:
+    """Refuse a failure that an aircraft has nothing for.
+
+    Args:
+        fault: The failure.
+        rolls: The aircraft leaves its plane of symmetry.
+
+    Raises:
+        InputError: The failure acts on one side, and the aircraft has but one half.
+    """
+    if fault.leaves_symmetry and not rolls:
+        key, value = ("actuator", fault.actuator) if fault.actuator else ("control", fault.control)
+        raise InputError(
+            "this aircraft moves in its plane of symmetry alone, where that cannot fail by itself",
+            key=f"faults.{key}", value=value, allowed="collective, cyclic, elevator; stick, lever",
+            mend="fly the plant lpv or nonlinear of an aircraft with a lateral half",
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

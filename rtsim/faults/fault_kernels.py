@@ -2,19 +2,15 @@
 
 A frame uses them in this order: ``fault_update`` switches failures on and off at the start of the frame;
 ``fault_airspeed_error`` and ``fault_nacelle_ok`` give what the sensors show; ``fault_nacelle_rate`` limits the nacelle
-command; ``fault_actuators_begin`` and ``fault_actuators_end`` stand around the plant's step, which knows nothing of
-failures. They work on the states that every plant has (``rtsim.aircraft.variables``). Equations: docs/faults.md.
+command; ``fault_controls`` holds jammed controls; then those of ``actuator_kernels`` stand around the plant's step.
+They work on the states that every plant has (``rtsim.aircraft.variables``). Equations: docs/faults.md.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-from rtsim.aircraft.table_kernels import curve
-from rtsim.aircraft.variables import STATE
-from rtsim.aircraft.xv15.dynamics_kernels import commanded_controls
-from rtsim.aircraft.xv15.tables import ControlTables
+from rtsim.aircraft.variables import INPUT, STATE
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.places import Places
@@ -28,11 +24,12 @@ KIND_HARD_OVER = 4
 KIND_AIRSPEED_BIAS = 5
 KIND_AIRSPEED_FROZEN = 6
 KIND_ENGINE_LIMIT = 7
+KIND_CONTROL_JAMMED = 8
 
 EVENT = Places(
     "time",
     "kind",
-    "channel",  # actuator: 0 collective, 1 cyclic, 2 elevator; else unused
+    "channel",  # actuator, its place among ``fault.ACTUATORS``, or control, its ``CHANNEL``; else unused
     "value",  # rate limit [rad/s], bias [m/s], shaft power available [W], or -1 / 1 for the lower / upper stop; by kind
     "rate",  # rate towards the stop of a hard-over [rad/s]
     "on",  # 1: begins; 0: ends
@@ -50,7 +47,13 @@ FAULT = Places(
     "jammed",  # 1 while the nacelles are jammed
     "nacelle_slow",  # 1 while the nacelle rate is limited
     "nacelle_rate",  # its limit [rad/s]
-    ("actuators", 3 * ACTUATOR.size),  # collective, cyclic, elevator
+    ("actuators", 9 * ACTUATOR.size),  # in the order of ``fault.ACTUATORS``
+    ("differences", 4),  # what the lateral controls ask of collective, cyclic, aileron and rudder, as last seen [rad]
+    "seen",  # 1 once that was seen
+    ("mean", 2),  # collective and cyclic of two sound sides: their mean
+    ("half", 2),  # and half difference [rad]
+    ("jam", 5),  # 1 while a control of the pilot is jammed, in the order of the channels of a command
+    ("stands", 5),  # where it stands
     "frozen",  # 1 while the airspeed indication stands still
     "held",  # the airspeed it stands at [m/s]
     "bias",  # added to the indicated airspeed [m/s]
@@ -59,8 +62,15 @@ FAULT = Places(
 )
 """Places in the state."""
 
-ACTUATOR_STATES = (STATE.collective_75, STATE.cyclic_1s, STATE.elevator)
-"""State of each actuator channel."""
+SYMMETRIC = (STATE.collective_75, STATE.cyclic_1s, STATE.elevator)
+"""State of each actuator that acts on both sides alike: the first channels."""
+CONTROL_INPUTS = (INPUT.stick, INPUT.lever, INPUT.nacelle_rate, INPUT.lateral_stick, INPUT.pedal)
+"""Input of each channel of a command."""
+LATERAL = (STATE.collective_difference, STATE.cyclic_difference, STATE.aileron, STATE.rudder)
+"""States that the lateral controls move."""
+ONE_SIDED = 3
+"""First channel of one side: right and left collective, right and left cyclic, then aileron and rudder."""
+CHANNELS_COUNT = 9
 
 MASK_JAMMED, MASK_NACELLE_SLOW, MASK_COLLECTIVE, MASK_CYCLIC, MASK_ELEVATOR, MASK_AIRSPEED, MASK_ENGINE = (
     1,
@@ -71,6 +81,7 @@ MASK_JAMMED, MASK_NACELLE_SLOW, MASK_COLLECTIVE, MASK_CYCLIC, MASK_ELEVATOR, MAS
     32,
     64,
 )
+MASK_ONE_SIDE, MASK_AILERON, MASK_RUDDER, MASK_CONTROL = 128, 256, 512, 1024
 """Bits of the mask of active failures."""
 
 _SAME_TIME = 1e-9
@@ -88,17 +99,47 @@ class FaultTables(NamedTuple):
     """Shaft power of both rotors per collective angle without axial flow [W/rad]."""
     power_per_collective_speed: float
     """Its growth with the airspeed along the mast [W s/(rad m)]."""
+    aileron_stop: float
+    """Largest aileron [rad]."""
+    rudder_stop: float
+    """Largest rudder [rad]."""
+    difference_rate: float
+    """Inverse lag of aileron, rudder and the half differences of collective and cyclic [1/s]."""
+
+
+@inner_kernel
+def actuator_angle(x: FloatArray, channel: int) -> float:
+    """Angle of an actuator [rad].
+
+    Args:
+        channel: Its place among ``fault.ACTUATORS``.
+    """
+    if channel < ONE_SIDED:
+        return float(x[SYMMETRIC[channel]])
+    place = channel - ONE_SIDED
+    if place < 4:
+        pair = place // 2
+        half = x[LATERAL[pair]]
+        return float(x[SYMMETRIC[pair]] + (half if place % 2 == 0 else -half))
+    return float(x[LATERAL[place - 2]])
 
 
 @inner_kernel
 def fault_apply(
-    state: FloatArray, change: FloatArray, x: FloatArray, nacelle: FloatArray, frequency: float, airspeed: float
+    state: FloatArray,
+    change: FloatArray,
+    x: FloatArray,
+    u: FloatArray,
+    nacelle: FloatArray,
+    frequency: float,
+    airspeed: float,
 ) -> None:
     """Let one failure begin or end.
 
     Args:
         state: Fault state, changed in place.
         change: Row of a schedule, shape (SCHEDULE_COLUMNS,).
+        u: Inputs that acted last; a jammed control stays there.
         nacelle: Conversion actuator: command angle, angle, rate; a jam sets the command angle.
         frequency: Natural frequency of the conversion actuator [rad/s].
         airspeed: What a sound airspeed indicator shows [m/s].
@@ -119,7 +160,7 @@ def fault_apply(
         place = FAULT.actuators + ACTUATOR.size * channel
         if on != 0.0:
             state[place + ACTUATOR.mode] = kind
-            state[place + ACTUATOR.value] = x[ACTUATOR_STATES[channel]] if kind == KIND_STUCK else value
+            state[place + ACTUATOR.value] = actuator_angle(x, channel) if kind == KIND_STUCK else value
             state[place + ACTUATOR.rate] = change[EVENT.rate]
         elif state[place + ACTUATOR.mode] == kind:
             state[place + ACTUATOR.mode] = 0.0
@@ -132,6 +173,11 @@ def fault_apply(
     elif kind == KIND_ENGINE_LIMIT:
         state[FAULT.engine] = on
         state[FAULT.power] = value
+    elif kind == KIND_CONTROL_JAMMED:
+        channel = int(change[EVENT.channel])
+        if on != 0.0 and state[FAULT.jam + channel] == 0.0:
+            state[FAULT.stands + channel] = u[CONTROL_INPUTS[channel]]
+        state[FAULT.jam + channel] = on
 
 
 @inner_kernel
@@ -140,6 +186,7 @@ def fault_update(
     state: FloatArray,
     time: float,
     x: FloatArray,
+    u: FloatArray,
     nacelle: FloatArray,
     frequency: float,
     airspeed: float,
@@ -149,13 +196,14 @@ def fault_update(
     Args:
         state: Fault state, changed in place.
         time: Time at the start of the frame [s].
+        u: Inputs that acted last; a jammed control stays there.
         nacelle: Conversion actuator; a jam sets its command angle.
         frequency: Natural frequency of the conversion actuator [rad/s].
         airspeed: What a sound airspeed indicator shows [m/s].
     """
     number = int(state[FAULT.next])
     while number < tables.schedule.shape[0] and tables.schedule[number, EVENT.time] <= time + _SAME_TIME:
-        fault_apply(state, tables.schedule[number], x, nacelle, frequency, airspeed)
+        fault_apply(state, tables.schedule[number], x, u, nacelle, frequency, airspeed)
         number += 1
     state[FAULT.next] = number
 
@@ -171,6 +219,12 @@ def fault_mask(state: FloatArray) -> int:
     for channel in range(3):
         if state[FAULT.actuators + ACTUATOR.size * channel] != 0.0:
             mask |= MASK_COLLECTIVE << channel
+    for channel in range(ONE_SIDED, CHANNELS_COUNT):
+        if state[FAULT.actuators + ACTUATOR.size * channel] != 0.0:
+            mask |= MASK_ONE_SIDE << max(channel - (CHANNELS_COUNT - 3), 0)
+    for channel in range(5):
+        if state[FAULT.jam + channel] != 0.0:
+            mask |= MASK_CONTROL
     if state[FAULT.frozen] != 0.0 or state[FAULT.bias] != 0.0:
         mask |= MASK_AIRSPEED
     if state[FAULT.engine] != 0.0:
@@ -215,96 +269,15 @@ def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
 
 
 @inner_kernel
-def collective_rate_limit(
-    tables: FaultTables, state: FloatArray, x: FloatArray, nacelle_angle: float, power: float
-) -> float:
-    """Fastest rise of the collective that the governor allows with the power at hand [rad/s]; negative: it must fall.
+def fault_controls(state: FloatArray, command: FloatArray, u: FloatArray) -> None:
+    """Hold the controls that are jammed where they stand.
 
     Args:
-        state: Fault state with a limited engine.
-        power: Shaft power of both rotors now [W].
+        state: Fault state.
+        command: The command that is to act; changed.
+        u: Inputs of the step; changed.
     """
-    along_mast = x[STATE.u] * math.cos(nacelle_angle) - x[STATE.w] * math.sin(nacelle_angle)
-    slope = tables.power_per_collective + tables.power_per_collective_speed * max(along_mast, 0.0)
-    return tables.governor_frequency * (state[FAULT.power] - power) / slope
-
-
-@inner_kernel
-def fault_actuators_begin(
-    tables: FaultTables,
-    state: FloatArray,
-    controls: ControlTables,
-    x: FloatArray,
-    commands: tuple[float, float],
-    nacelle_angle: float,
-    drive: tuple[float, bool],
-    dt: float,
-    planned: FloatArray,
-) -> None:
-    """Prepare the plant's step: decide where failed actuators will stand after it and make their mean over it right.
-
-    The plant moves an actuator by its own lag. A failed one is set, for the step alone, to the start from which that
-    motion has the mean of the failed motion; ``fault_actuators_end`` then puts it where the failure leaves it. What the
-    plant feels differs from the failed motion only by a ripple of zero mean within the frame.
-
-    Args:
-        controls: Gearing, limits and lags of the actuators.
-        x: Aircraft state at the start of the step; failed actuators are changed.
-        commands: Stick and lever of the step.
-        nacelle_angle: Nacelle angle in the middle of the step [rad].
-        drive: Shaft power that the rotor-speed governor asks for [W], and whether it is on.
-        planned: Written: angles of the actuators after the step; NaN where the plant's own are right, shape (3,).
-    """
-    planned[0] = planned[1] = planned[2] = math.nan
-    power, governed = drive
-    # Without its governor the rotor slows where the power is short; nothing takes the collective back.
-    limited = governed and state[FAULT.engine] != 0.0
-    failed = state[FAULT.actuators] != 0.0 or state[FAULT.actuators + ACTUATOR.size] != 0.0
-    failed = failed or state[FAULT.actuators + 2 * ACTUATOR.size] != 0.0
-    if not (limited or failed):
-        return
-    collective, cyclic, elevator = commanded_controls(controls, commands[0], commands[1], nacelle_angle)
-    low = curve(controls.collective_range, 0, nacelle_angle)
-    high = curve(controls.collective_range, 1, nacelle_angle)
-    for channel in range(3):
-        place = FAULT.actuators + ACTUATOR.size * channel
-        mode = state[place + ACTUATOR.mode]
-        begin = x[ACTUATOR_STATES[channel]]
-        command, lower, upper = collective, low, high
-        if channel == 1:
-            command, lower, upper = cyclic, -controls.cyclic_limit, controls.cyclic_limit
-        elif channel == 2:
-            command, lower, upper = elevator, -controls.elevator_limit, controls.elevator_limit
-        gone = -math.expm1(-controls.actuator_rate[channel] * dt)
-        own = begin + gone * (command - begin)
-        end = own
-        if mode == KIND_STUCK:
-            end = state[place + ACTUATOR.value]
-        elif mode == KIND_SLOW:
-            most = state[place + ACTUATOR.value] * dt
-            end = min(max(own, begin - most), begin + most)
-        elif mode == KIND_HARD_OVER:
-            most = state[place + ACTUATOR.rate] * dt
-            stop = upper if state[place + ACTUATOR.value] > 0.0 else lower
-            end = begin + min(max(stop - begin, -most), most)
-        # A stuck or run-away collective is beyond the governor's reach.
-        if channel == 0 and limited and mode != KIND_STUCK and mode != KIND_HARD_OVER:  # noqa: PLR1714
-            rise = collective_rate_limit(tables, state, x, nacelle_angle, power) * dt
-            end = min(end, max(begin + rise, min(lower, begin)))
-        if end != own:
-            planned[channel] = end
-            mean = 0.5 * (begin + end)
-            x[ACTUATOR_STATES[channel]] = (mean - 0.5 * gone * command) / (1.0 - 0.5 * gone)
-
-
-@inner_kernel
-def fault_actuators_end(planned: FloatArray, x: FloatArray) -> None:
-    """Put the failed actuators where they are after the plant's step.
-
-    Args:
-        planned: From ``fault_actuators_begin``.
-        x: Aircraft state after the step; failed actuators are changed.
-    """
-    for channel in range(3):
-        if not math.isnan(planned[channel]):
-            x[ACTUATOR_STATES[channel]] = planned[channel]
+    for channel in range(5):
+        if state[FAULT.jam + channel] != 0.0:
+            command[channel] = state[FAULT.stands + channel]
+            u[CONTROL_INPUTS[channel]] = state[FAULT.stands + channel]

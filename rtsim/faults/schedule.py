@@ -8,6 +8,7 @@ import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile, xv15_profile
 from rtsim.arrays import FloatArray
+from rtsim.command import CHANNELS
 from rtsim.faults import fault_kernels as kernels
 from rtsim.faults.fault import ACTUATORS, Fault, FaultKind, fault_changes
 from rtsim.faults.fault_kernels import FaultTables
@@ -22,6 +23,7 @@ KINDS: dict[FaultKind, int] = {
     "airspeed-bias": kernels.KIND_AIRSPEED_BIAS,
     "airspeed-frozen": kernels.KIND_AIRSPEED_FROZEN,
     "engine-limit": kernels.KIND_ENGINE_LIMIT,
+    "control-jammed": kernels.KIND_CONTROL_JAMMED,
 }
 """Failures by name, with their number in the kernels."""
 HARD_OVER_RATE = 20.0 * DEGREE
@@ -37,6 +39,8 @@ def fault_change(fault: Fault, *, on: bool, time: float, profile: AircraftProfil
         time: When [s].
     """
     channel = 0 if fault.actuator is None else ACTUATORS.index(fault.actuator)
+    if fault.control is not None:
+        channel = CHANNELS.index(fault.control.replace("-", "_"))
     rate = fault.rate if fault.kind == "actuator-hard-over" and fault.rate is not None else HARD_OVER_RATE
     row = np.array([time, KINDS[fault.kind], channel, fault.size(profile), rate, 1.0 if on else 0.0])
     row.setflags(write=False)  # like the rows of a schedule, so that one compiled kernel serves both
@@ -52,7 +56,9 @@ def fault_tables(faults: Sequence[Fault], profile: AircraftProfile | None = None
     Raises:
         InputError: A value of the aircraft's governor is missing or out of range.
     """
-    governor = (xv15_profile() if profile is None else profile).systems.table("governor")
+    systems = (xv15_profile() if profile is None else profile).systems
+    governor = systems.table("governor")
+    surfaces = systems.table("surfaces") if systems.has("surfaces") else xv15_profile().systems.table("surfaces")
     schedule = np.zeros((0, kernels.EVENT.size))
     changes = fault_changes(faults)
     if changes:
@@ -64,6 +70,9 @@ def fault_tables(faults: Sequence[Fault], profile: AircraftProfile | None = None
         governor_frequency=governor.number("collective_frequency_rad_s", low=0.0, high=100.0),
         power_per_collective=governor.number("power_per_collective_hp_deg", low=1e-3, high=1e6) * HORSEPOWER / DEGREE,
         power_per_collective_speed=growth * HORSEPOWER / DEGREE / KNOT,
+        aileron_stop=surfaces.number("aileron_stop_deg", low=0.0, high=90.0) * DEGREE,
+        rudder_stop=surfaces.number("rudder_stop_deg", low=0.0, high=90.0) * DEGREE,
+        difference_rate=1.0 / surfaces.number("actuator_tau_s", low=1e-3, high=10.0),
     )
 
 

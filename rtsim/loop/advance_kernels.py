@@ -15,7 +15,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.atmosphere.wind_kernels import level_motion, level_speed, meet_wind, over_ground, wind_along, wind_share
 from rtsim.corridor.corridor_kernels import corridor_level_step
-from rtsim.faults.fault_kernels import FAULT, fault_actuators_end, fault_nacelle_rate
+from rtsim.faults.fault_kernels import FAULT, fault_nacelle_rate
 from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
@@ -336,7 +336,7 @@ def move_plant(flight: Flight) -> None:
         flight.parts[PART.step], tables.plant.aircraft, x, u, scratch.path, dt, scratch.work
     )
     if failing:
-        fault_actuators_end(scratch.planned, x)
+        call_at(flight.parts[PART.failed], flight)
     if tables.wind.reference_height != 0.0:
         meet_wind(tables.wind, x, scratch.si[QUANTITY.altitude])
     _move_place(flight, heading)

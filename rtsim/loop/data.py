@@ -79,12 +79,12 @@ CHANNEL = Places(*CHANNELS)
 HELD = Places(*CHANNELS, ("reason", len(CHANNELS)))
 """What laws in Python hold until their next decision (NaN: the channel is the pilot's), and the limits behind it."""
 PART = Places(
-    "outputs", "step", "ask", "advance", "decide", "aids", "air", "faults", "fail", "automatic_rate",
+    "outputs", "step", "ask", "advance", "decide", "aids", "air", "faults", "fail", "failed", "automatic_rate",
     "automatic_advance", "script", "notice", "measure", "ask_lateral", "advance_lateral",
 )  # fmt: skip
 """Parts of the frame that are compiled on their own, by their places in ``Flight.parts``: plant (outputs, step), pilot
-(ask, advance), law (decide), pilot aids, gusts, failures (schedule, actuators), automatic nacelle, and what a
-batch hands in: a script (before, after the frame) and a measure of each row."""
+(ask, advance), law (decide), pilot aids, gusts, failures (schedule; before and after the step), automatic nacelle, and
+what a batch hands in: a script (before, after the frame) and a measure of each row."""
 
 
 class PlantTables(NamedTuple):

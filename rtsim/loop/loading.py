@@ -24,6 +24,7 @@ _PARTS: dict[str, Any] = {
     "air": parts.move_air,
     "faults": parts.schedule_faults,
     "fail": parts.fail_actuators,
+    "failed": parts.put_failed_actuators,
     "automatic_rate": parts.rate_of_automatic_nacelle,
     "automatic_advance": parts.advance_automatic_nacelle,
     "script": parts.act_script,
@@ -64,6 +65,7 @@ def load_part(flight: Flight, name: str, *, nonlinear: bool) -> None:
     flight.parts[getattr(PART, name)] = part_address(kernel, *arguments)
     if name == "faults":
         load_part(flight, "fail", nonlinear=nonlinear)
+        load_part(flight, "failed", nonlinear=nonlinear)
 
 
 def part_address(kernel: Any, *arguments: Any) -> int:

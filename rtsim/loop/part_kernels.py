@@ -11,7 +11,8 @@ from rtsim.aircraft.xv15.dynamics_kernels import flap_schedule
 from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST, gust_step
 from rtsim.atmosphere.wind_kernels import level_motion
-from rtsim.faults.fault_kernels import fault_actuators_begin, fault_update
+from rtsim.faults.actuator_kernels import fault_actuators_begin, fault_actuators_end
+from rtsim.faults.fault_kernels import fault_controls, fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
 from rtsim.loop.data import CHANNEL, CLOCK, KNOWN, MOTION, STATION, Flight
@@ -169,19 +170,20 @@ def schedule_faults(flight: Flight) -> float:
     tables, state, x = flight.tables, flight.state, flight.state.x
     time = state.clock[CLOCK.frame] * tables.dt
     airspeed = level_motion(x)[0] + state.gusts[GUST.ahead]
-    fault_update(tables.faults, state.faults, time, x, state.nacelle, tables.nacelle.frequency, airspeed)
+    fault_update(tables.faults, state.faults, time, x, state.u, state.nacelle, tables.nacelle.frequency, airspeed)
     return 0.0
 
 
 @part
 def fail_actuators(flight: Flight) -> float:
-    """Prepare the plant's step for failed actuators and a limited engine.
+    """Hold jammed controls, and prepare the plant's step for failed actuators and a limited engine.
 
     Args:
         flight: The flight before the step.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     acting = scratch.command[STATION.acting]
+    fault_controls(state.faults, acting, state.u)
     torque = 2.0 * scratch.y[OUTPUT.torque]
     power = torque * rotor_speed_now(tables.drive, state.drive)
     # Where an engine fails, collective is taken off until the power suffices to bring the rotors back too.
@@ -198,6 +200,20 @@ def fail_actuators(flight: Flight) -> float:
         tables.dt,
         scratch.planned,
     )
+    return 0.0
+
+
+@part
+def put_failed_actuators(flight: Flight) -> float:
+    """Put failed actuators where they are after the plant's step.
+
+    Args:
+        flight: The flight after the step.
+    """
+    tables, state = flight.tables, flight.state
+    fault_actuators_end(
+        tables.faults, state.faults, state.x, tables.dt, flight.scratch.planned
+    )  # fmt: skip
     return 0.0
 
 

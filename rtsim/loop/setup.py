@@ -36,7 +36,8 @@ from rtsim.choices import CorridorName, PlantName, SwitchName
 from rtsim.command import SENSOR
 from rtsim.corridor.corridor_kernels import MARGIN_COUNT, CorridorTables, new_level_state
 from rtsim.errors import InputError
-from rtsim.faults.fault import Fault
+from rtsim.faults.actuator_kernels import PLANNED
+from rtsim.faults.fault import Fault, check_sides
 from rtsim.faults.schedule import fault_tables, new_fault_state
 from rtsim.frame import SIGNAL_COUNT, UNIT_SCALES
 from rtsim.kernels.compiled import interpreted
@@ -274,6 +275,8 @@ def build_parts(setup: FlightSetup) -> Parts:
             "this aircraft moves in its plane of symmetry alone, and the programme asks for turns or sideward flight",
             key="plant", value=options.plant, mend="fly the plant lpv or nonlinear, or another programme",
         )  # fmt: skip
+    for fault in setup.faults:
+        check_sides(fault, rolls=rolls)
     wind = wind_tables(
         options.wind,
         None if options.wind_from < 0.0 else options.wind_from,
@@ -387,7 +390,7 @@ def new_scratch(tables: SimulationTables) -> Scratch:
         pilot=np.zeros(interpreted(pilot_work_size)(tables.pilot)),
         lateral_pilot=np.zeros(_lateral_sizes(tables)[1]),
         wanted=np.zeros(WANTED.size),
-        planned=np.zeros(3),
+        planned=np.zeros(PLANNED.size),
         sensors=np.zeros(SENSOR.size),
         law=np.zeros(WORK_SIZE),
         si=np.zeros(SIGNAL_COUNT),

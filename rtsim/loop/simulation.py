@@ -20,7 +20,7 @@ from rtsim.atmosphere.specification import Gust, Turbulence
 from rtsim.choices import PilotMode, SwitchName
 from rtsim.command import SENSOR, Command, Margins, Reference, Sensors
 from rtsim.errors import InputError, suggestion
-from rtsim.faults.fault import Fault, FaultSwitch
+from rtsim.faults.fault import Fault, FaultSwitch, check_sides
 from rtsim.faults.fault_kernels import fault_apply
 from rtsim.faults.schedule import fault_change
 from rtsim.frame import QUANTITY, SIGNAL_COUNT
@@ -351,11 +351,12 @@ class Simulation:
             fault: The failure; its times do not count.
             on: Begins; else ends.
         """
+        check_sides(fault, rolls=self.tables.plant.lateral != 0)
         self._observe()
         airspeed = float(self._scratch.si[QUANTITY.airspeed])
         state, frequency = self._state, self.tables.nacelle.frequency
         change = fault_change(fault, on=on, time=self.time, profile=self.database.profile)
-        interpreted(fault_apply)(state.faults, change, state.x, state.nacelle, frequency, airspeed)
+        interpreted(fault_apply)(state.faults, change, state.x, state.u, state.nacelle, frequency, airspeed)
         state.clock[CLOCK.faults] = 1.0
         self._observed = False
 

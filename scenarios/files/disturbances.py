@@ -128,6 +128,7 @@ def _fault(table: FaultTable) -> Fault:
         start=table.time_s,
         end=table.end_s,
         actuator=table.actuator,
+        control=table.control,
         rate=None if table.rate_deg_s is None else deg(table.rate_deg_s),
         stop=table.stop,
         bias=None if table.bias_kt is None else kt(table.bias_kt),

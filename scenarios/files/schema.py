@@ -13,7 +13,7 @@ from pydantic import Field, create_model
 
 from rtsim.atmosphere.specification import GustAxes, GustShape, Severity
 from rtsim.choices import PilotMode
-from rtsim.faults.fault import Actuator, EngineRating, FaultKind, Stop
+from rtsim.faults.fault import Actuator, Control, EngineRating, FaultKind, Stop
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.programme import LARGEST_BANK, LARGEST_LATERAL, LARGEST_TURN_RATE
@@ -128,6 +128,7 @@ class FaultTable(Strict):
     time_s: DurationS
     end_s: DurationS | None = None
     actuator: Actuator | None = None
+    control: Control | None = None
     rate_deg_s: Annotated[float, Field(ge=0.0, le=200.0, allow_inf_nan=False)] | None = None
     stop: Stop | None = None
     bias_kt: Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)] | None = None

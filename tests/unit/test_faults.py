@@ -13,7 +13,9 @@ from rtsim.aircraft.variables import ALL_INPUTS, ALL_OUTPUTS, ALL_STATES, INPUT,
 from rtsim.aircraft.xv15 import dynamics_kernels as nonlinear
 from rtsim.aircraft.xv15.model import Xv15
 from rtsim.errors import InputError
+from rtsim.faults import actuator_kernels as actuators
 from rtsim.faults import fault_kernels as kernels
+from rtsim.faults.actuator_kernels import PLANNED
 from rtsim.faults.fault import Fault, FaultEvent, engine_rating, fault_events
 from rtsim.faults.schedule import HARD_OVER_RATE, fault_tables, new_fault_state
 from rtsim.nacelle.nacelle_kernels import nacelle_advance, new_actuator_state
@@ -21,6 +23,7 @@ from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.units import HORSEPOWER, deg, kt
 
 DT = 0.004
+STILL = np.zeros(len(ALL_INPUTS))
 POSITIONS = (STATE.collective_75, STATE.cyclic_1s, STATE.elevator)
 NACELLE = load_nacelle_tables()
 
@@ -56,9 +59,9 @@ class Flight:
     def step(self, stick, lever):
         self.u[INPUT.stick], self.u[INPUT.lever] = stick, lever
         airspeed = self.x[STATE.u] * math.cos(self.x[STATE.pitch]) + self.x[STATE.w] * math.sin(self.x[STATE.pitch])
-        kernels.fault_update(self.faults, self.state, self.frame * DT, self.x, self.actuator, 3.0, airspeed)
-        planned = np.zeros(3)
-        kernels.fault_actuators_begin(
+        kernels.fault_update(self.faults, self.state, self.frame * DT, self.x, self.u, self.actuator, 3.0, airspeed)
+        planned = np.zeros(PLANNED.size)
+        actuators.fault_actuators_begin(
             self.faults,
             self.state,
             self.tables.controls,
@@ -70,7 +73,7 @@ class Flight:
             planned,
         )
         nonlinear.step(self.tables, self.x, self.u, self.path, DT, self.work)
-        kernels.fault_actuators_end(planned, self.x)
+        actuators.fault_actuators_end(self.faults, self.state, self.x, DT, planned)
         self.frame += 1
         return self.x.copy()
 
@@ -142,11 +145,11 @@ def test_a_hard_over_runs_to_its_stop_at_its_rate(aircraft, stop, sign):
 def test_sound_actuators_are_not_touched(aircraft):
     """Bit for bit the plant's own step, and planned says so."""
     flight = Flight(aircraft, [], airspeed=60.0, nacelle=82.5)
-    x, planned = flight.x.copy(), np.zeros(3)
+    x, planned = flight.x.copy(), np.zeros(PLANNED.size)
     arguments = (aircraft.tables.controls, x, (0.3, 0.4), flight.nacelle, (1e6, True), DT, planned)
-    kernels.fault_actuators_begin(flight.faults, flight.state, *arguments)
-    assert np.isnan(planned).all()
-    kernels.fault_actuators_end(planned, x)
+    actuators.fault_actuators_begin(flight.faults, flight.state, *arguments)
+    assert np.isnan(planned[:3]).all()
+    actuators.fault_actuators_end(flight.faults, flight.state, x, DT, planned)
     assert x.tobytes() == flight.x.tobytes()
 
 
@@ -171,13 +174,13 @@ def test_begin_is_its_plain_twin(aircraft, mode, channel):
     fault = Fault(kind=f"actuator-{mode}", actuator=name, start=0.0, **fields)
     flight = Flight(aircraft, [fault], airspeed=60.0, nacelle=82.5)
     begin = flight.x[POSITIONS[channel]]
-    kernels.fault_update(flight.faults, flight.state, 0.0, flight.x, flight.actuator, 3.0, 30.0)
-    planned = np.zeros(3)
+    kernels.fault_update(flight.faults, flight.state, 0.0, flight.x, flight.u, flight.actuator, 3.0, 30.0)
+    planned = np.zeros(PLANNED.size)
     controls = aircraft.tables.controls
     commands = nonlinear.commanded_controls(controls, -0.4, 0.8, flight.nacelle)
     low = nonlinear.commanded_controls(controls, 0.0, 0.0, flight.nacelle)[0]
     stops = (low, -controls.cyclic_limit, -controls.elevator_limit)
-    kernels.fault_actuators_begin(
+    actuators.fault_actuators_begin(
         flight.faults, flight.state, controls, flight.x, (-0.4, 0.8), flight.nacelle, (1e6, True), DT, planned
     )
     value = begin if mode == "stuck" else deg(2.0)
@@ -186,7 +189,7 @@ def test_begin_is_its_plain_twin(aircraft, mode, channel):
     )
     assert planned[channel] == pytest.approx(end, rel=1e-12)
     assert flight.x[POSITIONS[channel]] == pytest.approx(start, rel=1e-9)
-    assert np.isnan(np.delete(planned, channel)).all()
+    assert np.isnan(np.delete(planned[:3], channel)).all()
 
 
 def test_a_jam_stops_the_nacelles_within_a_second_and_without_turning_back():
@@ -196,7 +199,7 @@ def test_a_jam_stops_the_nacelles_within_a_second_and_without_turning_back():
     x = np.zeros(len(ALL_STATES))
     angles, rates, ok = [], [], []
     for k in range(1250):
-        kernels.fault_update(tables, state, k * DT, x, nacelle, NACELLE.frequency, 0.0)
+        kernels.fault_update(tables, state, k * DT, x, STILL, nacelle, NACELLE.frequency, 0.0)
         nacelle_advance(NACELLE, nacelle, kernels.fault_nacelle_rate(state, deg(-3.0)), DT)
         angles.append(nacelle[1])
         rates.append(nacelle[2])
@@ -218,7 +221,7 @@ def test_slow_nacelles_keep_the_sign_and_small_rates():
     state = new_fault_state()
     assert kernels.fault_nacelle_rate(state, deg(-12.0)) == deg(-12.0)
     tables = fault_tables([Fault(kind="nacelle-slow", start=0.0, rate=deg(1.0))])
-    kernels.fault_update(tables, state, 0.0, np.zeros(len(ALL_STATES)), np.zeros(3), 3.0, 0.0)
+    kernels.fault_update(tables, state, 0.0, np.zeros(len(ALL_STATES)), STILL, np.zeros(3), 3.0, 0.0)
     rates = [kernels.fault_nacelle_rate(state, deg(rate)) for rate in (-12.0, -0.5, 0.0, 0.5, 12.0)]
     assert rates == pytest.approx([deg(rate) for rate in (-1.0, -0.5, 0.0, 0.5, 1.0)])
     assert kernels.fault_nacelle_ok(state)
@@ -234,7 +237,7 @@ def test_the_airspeed_indication_is_biased_or_stands_still():
     shown = []
     for second in range(6):
         true = 40.0 + second
-        kernels.fault_update(tables, state, float(second), x, nacelle, 3.0, true)
+        kernels.fault_update(tables, state, float(second), x, STILL, nacelle, 3.0, true)
         shown.append(true + kernels.fault_airspeed_error(state, true))
     bias = kt(10.0)
     assert shown == pytest.approx([40.0, 41.0 + bias, 42.0 + bias, 43.0 + bias, 44.0, 45.0])
@@ -280,11 +283,11 @@ def test_power_enough_is_no_failure(aircraft):
 def test_the_governor_approaches_the_limit_from_below_as_one_exponential(aircraft):
     """Its rule in plain Python: collective rises no faster than frequency * power left / power per collective."""
     flight = Flight(aircraft, [Fault(kind="engine-limit", start=0.0, power=0.0)], airspeed=150.0, nacelle=20.0)
-    kernels.fault_update(flight.faults, flight.state, 0.0, flight.x, flight.actuator, 3.0, 0.0)
+    kernels.fault_update(flight.faults, flight.state, 0.0, flight.x, flight.u, flight.actuator, 3.0, 0.0)
     along = flight.x[STATE.u] * math.cos(flight.nacelle) - flight.x[STATE.w] * math.sin(flight.nacelle)
     slope = (160.0 + 5.0 * along / kt(1.0)) * HORSEPOWER / deg(1.0)
     for power in (0.0, 1e6, 2e6):
-        limit = kernels.collective_rate_limit(flight.faults, flight.state, flight.x, flight.nacelle, power)
+        limit = actuators.collective_rate_limit(flight.faults, flight.state, flight.x, flight.nacelle, power)
         assert limit == pytest.approx(3.0 * (0.93 * 1802.0 * HORSEPOWER - power) / slope)
 
 
@@ -323,7 +326,7 @@ def test_the_mask_names_every_failure():
         tables = fault_tables([Fault(start=1.0, end=2.0, **fields)])
         masks = []
         for time in (0.0, 1.0, 2.0):
-            kernels.fault_update(tables, state, time, x, nacelle, 3.0, 0.0)
+            kernels.fault_update(tables, state, time, x, STILL, nacelle, 3.0, 0.0)
             masks.append(kernels.fault_mask(state))
         assert masks == [0, mask, 0], fields
 
@@ -338,7 +341,7 @@ def test_the_mask_names_every_failure():
         ({"kind": "nacelle-slow"}, "rate: is missing for nacelle-slow"),
         ({"kind": "nacelle-slow", "rate": -0.1}, "rate: is out of range"),
         ({"kind": "actuator-stuck"}, "actuator: is missing"),
-        ({"kind": "actuator-stuck", "actuator": "rudder"}, "collective, cyclic, elevator"),
+        ({"kind": "actuator-stuck", "actuator": "throttle"}, "collective, cyclic, elevator, collective-right"),
         ({"kind": "actuator-hard-over", "actuator": "cyclic"}, "stop: is missing"),
         ({"kind": "actuator-hard-over", "actuator": "cyclic", "stop": "up"}, "stop: is not known"),
         ({"kind": "actuator-hard-over", "actuator": "cyclic", "stop": "low", "rate": 0.0}, "rate: is out of range"),
