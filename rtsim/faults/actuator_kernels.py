@@ -61,7 +61,7 @@ def collective_rate_limit(
     """
     along_mast = x[STATE.u] * math.cos(nacelle_angle) - x[STATE.w] * math.sin(nacelle_angle)
     slope = tables.power_per_collective + tables.power_per_collective_speed * max(along_mast, 0.0)
-    return tables.governor_frequency * (state[FAULT.power] - power) / slope
+    return float(tables.governor_frequency * (state[FAULT.power] - power) / slope)
 
 
 @inner_kernel

@@ -269,15 +269,13 @@ def fault_nacelle_rate(state: FloatArray, rate: float) -> float:
 
 
 @inner_kernel
-def fault_controls(state: FloatArray, command: FloatArray, u: FloatArray) -> None:
+def fault_controls(state: FloatArray, command: FloatArray) -> None:
     """Hold the controls that are jammed where they stand.
 
     Args:
         state: Fault state.
         command: The command that is to act; changed.
-        u: Inputs of the step; changed.
     """
     for channel in range(5):
         if state[FAULT.jam + channel] != 0.0:
             command[channel] = state[FAULT.stands + channel]
-            u[CONTROL_INPUTS[channel]] = state[FAULT.stands + channel]

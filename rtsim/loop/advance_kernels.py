@@ -15,7 +15,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.atmosphere.wind_kernels import level_motion, level_speed, meet_wind, over_ground, wind_along, wind_share
 from rtsim.corridor.corridor_kernels import corridor_level_step
-from rtsim.faults.fault_kernels import FAULT, fault_nacelle_rate
+from rtsim.faults.fault_kernels import FAULT, fault_controls, fault_nacelle_rate
 from rtsim.frame import COLUMN, QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.parts import call_at
@@ -233,7 +233,7 @@ def hold(flight: Flight) -> None:
 
 @inner_kernel
 def fail(flight: Flight) -> None:
-    """Let ``protected`` act as far as failed and limited nacelles follow it. Writes ``acting``.
+    """Let ``protected`` act as far as failed and limited nacelles, and jammed controls, let it. Writes ``acting``.
 
     Args:
         flight: The flight as ``protect`` left it.
@@ -247,6 +247,8 @@ def fail(flight: Flight) -> None:
         wanted = min(wanted, 0.0)
     rate = fault_nacelle_rate(state.faults, wanted)
     acting[CHANNEL.nacelle_rate] = nacelle_effective_rate(tables.nacelle, state.nacelle, rate, tables.dt)
+    if faults_act(flight):
+        fault_controls(state.faults, acting)
 
 
 @inner_kernel

@@ -12,7 +12,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST, gust_step
 from rtsim.atmosphere.wind_kernels import level_motion
 from rtsim.faults.actuator_kernels import fault_actuators_begin, fault_actuators_end
-from rtsim.faults.fault_kernels import fault_controls, fault_update
+from rtsim.faults.fault_kernels import fault_update
 from rtsim.kernels.compiled import part
 from rtsim.loop import script_kernels as script
 from rtsim.loop.data import CHANNEL, CLOCK, KNOWN, MOTION, STATION, Flight
@@ -176,14 +176,13 @@ def schedule_faults(flight: Flight) -> float:
 
 @part
 def fail_actuators(flight: Flight) -> float:
-    """Hold jammed controls, and prepare the plant's step for failed actuators and a limited engine.
+    """Prepare the plant's step for failed actuators and a limited engine.
 
     Args:
         flight: The flight before the step.
     """
     tables, state, scratch = flight.tables, flight.state, flight.scratch
     acting = scratch.command[STATION.acting]
-    fault_controls(state.faults, acting, state.u)
     torque = 2.0 * scratch.y[OUTPUT.torque]
     power = torque * rotor_speed_now(tables.drive, state.drive)
     # Where an engine fails, collective is taken off until the power suffices to bring the rotors back too.

@@ -95,7 +95,7 @@ def test_an_aircraft_with_one_half_refuses_it_scheduled_and_live(tmp_path):
 def test_a_scenario_file_says_it(tmp_path):
     file = tmp_path / "jam.toml"
     file.write_text(
-        'format = 1\nname = "jam"\nduration_s = 2\n[start]\ncondition = "hover"\n'
+        'format = 1\nname = "jam"\ntitle = "Jam"\nduration_s = 2\n[start]\ncondition = "hover"\n'
         '[[faults]]\nkind = "control-jammed"\ncontrol = "pedal"\ntime_s = 1\n'
         '[[faults]]\nkind = "actuator-stuck"\nactuator = "collective-left"\ntime_s = 1.5\n'
     )
