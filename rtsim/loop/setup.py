@@ -269,7 +269,7 @@ def build_parts(setup: FlightSetup) -> Parts:
     held = (drive.governed_speed + offset, nacelle if offset == 0.0 else drive.slow_axis * offset)
     programme = setup.programme
     lpv = None if nonlinear else _lpv_tables(database, options.plant)
-    rolls = nonlinear or hasattr(lpv, "symmetric")
+    rolls = database.lateral is not None if nonlinear else hasattr(lpv, "symmetric")
     if not (rolls or programme.symmetric):
         raise InputError(
             "this aircraft moves in its plane of symmetry alone, and the programme asks for turns or sideward flight",

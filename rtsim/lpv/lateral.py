@@ -23,6 +23,8 @@ from rtsim.lpv.database import Database, StoredArrays
 
 REFERENCE_BITS = 36
 """Bits kept of the mantissa of the references (11 significant digits)."""
+LATERAL_AXES = {"load_factor": 1.0, "lateral_velocity": 0.0}
+"""The axes of the arrays, with what their values are above."""
 _cell = interpreted(cell)
 _DERIVATIVES = ("loaded_A", "loaded_B", "loaded_C", "loaded_D", "A", "B", "C", "D")
 
@@ -110,7 +112,7 @@ class LateralData:
                 raise InputError(
                     "wrong shape", key=f"lateral/{name}", value=getattr(data, name).shape, allowed=f"{shape}"
                 )
-        for name, low in (("load_factor", 1.0), ("lateral_velocity", 0.0)):
+        for name, low in LATERAL_AXES.items():
             axis = getattr(data, name)
             if axis[0] <= low or np.any(np.diff(axis) <= 0.0):
                 raise InputError(

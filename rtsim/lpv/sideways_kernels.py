@@ -72,11 +72,6 @@ SCHEDULE = Places(
 
 
 @inner_kernel
-def _slip_count(tables: SidewaysTables) -> int:
-    return int(tables.slip.shape[3])
-
-
-@inner_kernel
 def sideways_work_size(tables: SidewaysTables) -> int:
     """Length of the work array.
 

@@ -61,8 +61,6 @@ TRIM = Places("bank", ("hand", 2), "p", "r")
 """What it follows: bank, hands and rates of the commanded motion."""
 SLIP_ENTRIES = 3
 """Bank, lateral stick and pedals of each trim in sideslip."""
-LEAD_ENTRIES = 8
-"""Hands per roll and yaw rate, then per roll and yaw acceleration."""
 CAPTURE_TURN_RATE, CAPTURE_TURN_ACCELERATION = 6.0 * DEGREE, 4.0 * DEGREE
 """Fastest capture of a heading [rad/s], and its acceleration [rad/s^2]."""
 CAPTURE_LATERAL_RATE, CAPTURE_LATERAL_JERK = 1.0, 1.0
@@ -78,7 +76,7 @@ class LateralPilotTables(NamedTuple):
 
     mocm: PilotTables
     """Gains and what goes with them; ``trim`` holds bank, lateral stick and pedals of each trim in sideslip, then the
-    hands' leads (V, N, 3 M + 8)."""
+    hands per roll and yaw rate, then per roll and yaw acceleration (V, N, 3 M + 8)."""
     velocity: FloatArray
     """Sideward velocities of these trims (M,) [m/s]."""
 

@@ -250,6 +250,7 @@ class Bench:
         condition = self.condition(airspeed_kt, 90.0)
         unit = np.array([POUND_FORCE, POUND_FORCE, FOOT_POUND])
         found = self.aircraft.at(condition).component_loads(*state, condition.nacelle_angle)
+        found = {name: np.asarray(load[: unit.size]) for name, load in found.items()}  # those in the plane of symmetry
         loads = {name: np.asarray(load / unit) for name, load in found.items()}
         loads["rotor total"] = loads["rotors"] + loads["spinners"]
         loads["airframe"] = np.sum(list(found.values()), axis=0) / unit - loads["rotor total"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rtsim.analysis.frozen_loop import FrozenCommand, frozen_loop, stability_map
+from rtsim.analysis.lateral_loop import lateral_stability_map
 from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
@@ -25,6 +26,15 @@ def test_default_form_is_stable_at_every_valid_point_and_mid_cell(mid_cells: boo
     result = stability_map(DATABASE, mid_cells=mid_cells)
     expected = 600 if not mid_cells else 500
     assert np.isfinite(result.growth).sum() > expected
+    assert result.unstable == []
+    assert np.nanmax(result.growth) < -0.03
+
+
+@pytest.mark.parametrize("mid_cells", [False, True])
+def test_the_lateral_half_is_stable_at_every_valid_point_and_mid_cell(mid_cells: bool) -> None:
+    """Held to the bound of the longitudinal half."""
+    result = lateral_stability_map(DATABASE, mid_cells=mid_cells)
+    assert np.isfinite(result.growth).sum() > (500 if mid_cells else 600)
     assert result.unstable == []
     assert np.nanmax(result.growth) < -0.03
 

@@ -60,7 +60,7 @@ def test_it_is_built_once_flown_and_replayed(kept: Path, tmp_path: Path) -> None
     assert abs(sum(shares) - 1.0) < 1e-9
     assert record.completed
     database = load_database(CONDITION)
-    assert set(database.pilot) == {"integrators", "pi"}
+    assert set(database.pilot) == {"integrators", "pi", "lateral"}
     assert record.database_hash == database.aircraft_hash != load_database().aircraft_hash
     with told(lambda *_: pytest.fail("it was built a second time")):
         replay = replay_log(tmp_path / "log.parquet")

@@ -178,7 +178,7 @@ def test_info_describes_the_shipped_database(capsys):
     assert result["neighbour_check"]["above"] == 0
     assert result["neighbour_check"]["largest"] <= 0.01
     assert {170.0, 180.0} <= set(result["airspeed_kt"])
-    assert set(result["pilots"]) == {"integrators", "pi"}
+    assert set(result["pilots"]) == {"integrators", "pi", "lateral"}
     assert len(result["states"]) == 17
 
 

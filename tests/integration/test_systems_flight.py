@@ -231,6 +231,7 @@ def without_inputs(database: Database, names: tuple[str, ...]) -> Database:
         u_ref=database.u_ref[..., keep],
         B=database.B[..., keep],
         D=database.D[..., keep],
+        lateral=None,
     )
 
 

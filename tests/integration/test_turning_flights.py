@@ -24,8 +24,9 @@ from scenarios.flight.runner import FlightOutputs
 ODD = (
     "bank_deg", "roll_rate_deg_s", "yaw_rate_deg_s", "turn_rate_deg_s", "sideslip_deg", "lateral_kt",
     "lateral_acceleration", "east_m", "aileron_deg", "rudder_deg", "differential_collective_deg",
-    "differential_cyclic_deg", "gust_v_m_s", "gust_p_deg_s", "gust_r_deg_s", "wind_east_m_s", "lateral_stick", "pedal",
-    "pilot_lateral_stick", "pilot_pedal", "protection_lateral_stick", "protection_pedal", "bank_reference_deg",
+    "differential_cyclic_deg", "differential_longitudinal_flapping_deg",
+    "differential_lateral_flapping_deg", "gust_v_m_s", "gust_p_deg_s", "gust_r_deg_s", "wind_east_m_s", "lateral_stick",
+    "pedal", "pilot_lateral_stick", "pilot_pedal", "protection_lateral_stick", "protection_pedal", "bank_reference_deg",
     "lateral_reference_kt", "track_error_m",
 )  # fmt: skip
 """Columns that change their sign in a mirror; in symmetric flight they are zero."""

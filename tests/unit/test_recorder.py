@@ -182,7 +182,7 @@ def test_a_write_that_fails_midway_ends_the_log_and_not_the_flight(tmp_path: Pat
     path = tmp_path / "flight.parquet"
     metadata = FlightMetadata("x", "", "h", 0, 250.0)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))
     try:
         recorder = Recorder(path, metadata, live=True)  # the writer inherits the limit
     finally:

@@ -14,6 +14,7 @@ from rtsim.errors import InputError
 from rtsim.lpv.database import AXES, GRIDDED, Database, StoredArrays
 from rtsim.lpv.files.assemble import KINDS, LARGEST_CONTENT, LARGEST_FILE, assemble_database, real_array
 from rtsim.lpv.files.mat_layout import unpacked
+from rtsim.lpv.lateral import LATERAL_AXES
 from rtsim.outside import read_bytes, regular_file, understanding
 from rtsim.whole_file import whole_file
 
@@ -52,7 +53,7 @@ def read_mat(path: str | Path) -> Database:
             {kind: _variables(content, kind, str(file)) for kind in KINDS},
             attributes=_attributes(content.get("attributes")),
             pilot=_pilots(content.get("pilot"), str(file)),
-            lateral=_stored(content["lateral"], "lateral", str(file)) if "lateral" in content else None,
+            lateral=_lateral(content["lateral"], str(file)) if "lateral" in content else None,
             file=str(file),
         )
 
@@ -145,3 +146,9 @@ def _stored(value: Any, path: str, file: str) -> StoredArrays:
     parts = _record(value)
     attributes = _attributes(parts.pop("attributes", None))
     return StoredArrays({name: real_array(f"{path}.{name}", entry, file) for name, entry in parts.items()}, attributes)
+
+
+def _lateral(value: Any, file: str) -> StoredArrays:
+    stored = _stored(value, "lateral", file)
+    axes = {name: stored.arrays[name].ravel() for name in LATERAL_AXES if name in stored.arrays}
+    return StoredArrays({**stored.arrays, **axes}, stored.attributes)
