@@ -71,6 +71,22 @@ class Levels:
 
 
 @dataclass(frozen=True, slots=True)
+class Turning:
+    """How far a turn moves the sides of a corridor: its load factor raises the stall and the mast torque."""
+
+    nacelle: FloatArray
+    """Nacelle angles, ascending, shape (n,) [rad]."""
+    low: FloatArray
+    """What the low-speed side gains for each unit of load factor above 1, shape (n,) [m/s]."""
+    high: FloatArray
+    """The same of the high-speed side off the downstop, negative or 0, shape (n,) [m/s]."""
+
+
+STRAIGHT = Turning(np.array([0.0, 1.0]), np.zeros(2), np.zeros(2))
+"""Sides that a turn does not move: those of an aircraft that does not turn, and of a chart by itself."""
+
+
+@dataclass(frozen=True, slots=True)
 class Corridor:
     """A conversion corridor: the airspeeds that each nacelle angle allows."""
 
@@ -88,6 +104,8 @@ class Corridor:
     """High-speed side on the downstop [m/s]."""
     levels: Levels
     """Warning levels of its margins."""
+    turning: Turning = STRAIGHT
+    """What a turn changes; the chart is that of straight flight."""
 
     def in_true_airspeed(self, factor: float) -> Corridor:
         """The same corridor for true airspeeds: the charts are in calibrated airspeed.
@@ -134,17 +152,20 @@ class Corridor:
         speed = 0.5 * (np.maximum(self.low.at(nacelle_angle), 0.0) + self.high.at(nacelle_angle))
         return float(speed) if np.ndim(speed) == 0 else speed
 
-    def margins(self, airspeed: float, nacelle_angle: float) -> Margins:
+    def margins(self, airspeed: float, nacelle_angle: float, bank: float = 0.0) -> Margins:
         """Signed distances to the boundaries, positive inside.
 
         The nacelle margins are travels at fixed airspeed to the first angle that violates a boundary, or to the end of
         the travel (0 and 95 deg) where none does. Outside, the one towards the violated boundary is negative: that
         much travel the other way re-enters. Where no nacelle angle would do, both are minus the whole travel.
+
+        Args:
+            bank: Bank angle of the turn [rad]; its load factor moves the sides.
         """
-        from rtsim.corridor.corridor_kernels import MARGIN_COUNT, corridor_margins
+        from rtsim.corridor.corridor_kernels import MARGIN_COUNT, corridor_margins, turn_excess
 
         out = np.empty(MARGIN_COUNT)
-        corridor_margins(self.tables(), airspeed, nacelle_angle, out)
+        corridor_margins(self.tables(), airspeed, nacelle_angle, turn_excess(bank), out)
         return Margins(low=out[0].item(), high=out[1].item(), nacelle_forward=out[2].item(), nacelle_aft=out[3].item())
 
     def inside(self, airspeed: float, nacelle_angle: float) -> bool:
@@ -163,6 +184,9 @@ class Corridor:
             high_speed=self.high.speed,
             downstop_nacelle=self.downstop_nacelle,
             downstop_speed=self.downstop_speed,
+            turn_nacelle=self.turning.nacelle,
+            turn_low=self.turning.low,
+            turn_high=self.turning.high,
             level_threshold=self.levels.threshold,
             level_hysteresis=self.levels.hysteresis,
             level_rise_time=self.levels.rise_time,

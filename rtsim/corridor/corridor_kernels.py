@@ -6,6 +6,7 @@ speed the allowed nacelle angles are one interval; ``Corridor`` checks this when
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,8 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.kernels.compiled import inner_kernel
 
+LARGEST_BANK = math.pi / 3.0
+"""Bank up to which a turn moves the sides [rad]: a load factor of 2."""
 LOW, HIGH, NACELLE_FORWARD, NACELLE_AFT = 0, 1, 2, 3
 """Places of the margins in the array that ``corridor_margins`` fills."""
 MARGIN_COUNT = 4
@@ -36,6 +39,12 @@ class CorridorTables(NamedTuple):
     """At and below this angle the nacelles rest on the airplane-mode stop [rad]."""
     downstop_speed: float
     """High-speed boundary on the downstop [m/s]."""
+    turn_nacelle: FloatArray
+    """Nacelle angles of what a turn changes, shape (k,) [rad]."""
+    turn_low: FloatArray
+    """What the low-speed boundary gains for each unit of load factor above 1, shape (k,) [m/s]."""
+    turn_high: FloatArray
+    """The same of the high-speed boundary off the downstop, shape (k,) [m/s]."""
     level_threshold: FloatArray
     """Margins below which caution, warning, exceedance begin, shape (3,), falling [m/s]."""
     level_hysteresis: float
@@ -44,6 +53,16 @@ class CorridorTables(NamedTuple):
     """How long the margin must be below a threshold before the level begins [s]."""
     level_fall_time: float
     """How long the margin must be above threshold + hysteresis before the level ends [s]."""
+
+
+@inner_kernel
+def turn_excess(bank: float) -> float:
+    """Load factor of a level turn less 1; 0 in straight flight, whatever the load there.
+
+    Args:
+        bank: Bank angle [rad]; beyond 60 deg it counts as 60 deg.
+    """
+    return 1.0 / math.cos(min(abs(bank), LARGEST_BANK)) - 1.0 if bank != 0.0 else 0.0
 
 
 @inner_kernel
@@ -107,7 +126,9 @@ def most_aft_angle(tables: CorridorTables, airspeed: float) -> float:
 
 
 @inner_kernel
-def corridor_margins(tables: CorridorTables, airspeed: float, nacelle_angle: float, out: FloatArray) -> None:
+def corridor_margins(
+    tables: CorridorTables, airspeed: float, nacelle_angle: float, excess: float, out: FloatArray
+) -> None:
     """Signed distances to the boundaries, positive inside.
 
     The nacelle margins are measured at fixed airspeed to the first angle that violates a boundary, or to the end of the
@@ -115,17 +136,23 @@ def corridor_margins(tables: CorridorTables, airspeed: float, nacelle_angle: flo
     other way, is needed to re-enter. Both are continuous across a boundary.
 
     Args:
+        excess: Load factor of the turn less 1.
         out: Filled with low, high [m/s], nacelle forward, nacelle aft [rad]; shape (4,).
     """
+    slow = fast = airspeed  # in a turn each side is met as if the airspeed were nearer to it
+    if excess != 0.0:
+        slow -= excess * boundary_speed(tables.turn_nacelle, tables.turn_low, nacelle_angle)
+        fast -= excess * boundary_speed(tables.turn_nacelle, tables.turn_high, nacelle_angle)
     high = boundary_speed(tables.high_nacelle, tables.high_speed, nacelle_angle)
     if nacelle_angle <= tables.downstop_nacelle:
         high = tables.downstop_speed
-    out[0] = airspeed - boundary_speed(tables.low_nacelle, tables.low_speed, nacelle_angle)
-    out[1] = high - airspeed
-    out[2] = nacelle_angle - most_forward_angle(tables, airspeed)
-    out[3] = most_aft_angle(tables, airspeed) - nacelle_angle
+        fast = airspeed
+    out[0] = slow - boundary_speed(tables.low_nacelle, tables.low_speed, nacelle_angle)
+    out[1] = high - fast
+    out[2] = nacelle_angle - most_forward_angle(tables, slow)
+    out[3] = most_aft_angle(tables, fast) - nacelle_angle
     # No angle would do: neither direction re-enters, so both margins are the whole travel, negative.
-    if airspeed < tables.low_speed[tables.low_speed.shape[0] - 1] or airspeed > tables.downstop_speed:
+    if slow < tables.low_speed[tables.low_speed.shape[0] - 1] or fast > tables.downstop_speed:
         travel = tables.low_nacelle[tables.low_nacelle.shape[0] - 1] - tables.low_nacelle[0]
         out[2] = -travel
         out[3] = -travel

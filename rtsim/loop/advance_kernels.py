@@ -184,11 +184,9 @@ def protect(flight: Flight) -> None:
     if law_due(tables.protection, state.protection, int(state.clock[CLOCK.frame])):
         call_at(flight.parts[PART.decide], flight)
     law_apply(tables.protection, state.protection, aided, limited)
-    # No compiled law limits these yet.
-    limited[CHANNEL.lateral_stick], limited[CHANNEL.pedal] = aided[CHANNEL.lateral_stick], aided[CHANNEL.pedal]
     law_state, si = state.protection, scratch.si
     causes = (law_state[law.LAW.stick_cause], law_state[law.LAW.lever_cause], law_state[law.LAW.rate_cause])
-    _note_change(flight, causes, (0.0, 0.0))
+    _note_change(flight, causes, (law_state[law.LAW.lateral_cause], law_state[law.LAW.pedal_cause]))
     si[QUANTITY.time_to_limit] = law_state[law.LAW.time]
 
 

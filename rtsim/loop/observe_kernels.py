@@ -10,7 +10,7 @@ from rtsim.arrays import FloatArray
 from rtsim.atmosphere.gust_kernels import GUST
 from rtsim.atmosphere.wind_kernels import level_motion, level_speed, wind_along, wind_gradient, wind_share
 from rtsim.command import SENSOR
-from rtsim.corridor.corridor_kernels import corridor_margins
+from rtsim.corridor.corridor_kernels import corridor_margins, turn_excess
 from rtsim.faults.fault_kernels import FAULT, fault_airspeed_error, fault_mask, fault_nacelle_ok
 from rtsim.frame import QUANTITY
 from rtsim.kernels.compiled import inner_kernel
@@ -119,7 +119,7 @@ def observe(flight: Flight) -> None:
     scratch.y[OUTPUT.airspeed_rate] -= wind_gradient(tables.wind, x[STATE.altitude]) * climb * wind_ahead
     st, ct = math.sin(x[STATE.pitch]), math.cos(x[STATE.pitch])
     airspeed = through + gusts[GUST.ahead]
-    corridor_margins(tables.corridor, airspeed, angle, scratch.margins)
+    corridor_margins(tables.corridor, airspeed, angle, turn_excess(x[STATE.bank]), scratch.margins)
     _see(flight, airspeed)
     y = scratch.y
     rotor_speed = rotor_speed_now(tables.drive, state.drive)
@@ -316,7 +316,8 @@ def _see(flight: Flight, airspeed: float) -> None:
         for k in range(scratch.margins.shape[0]):
             shown[1 + k] = scratch.margins[k]
     else:
-        corridor_margins(tables.corridor, shown[0], scratch.motion[MOTION.angle], shown[1:])
+        excess = turn_excess(x[STATE.bank])
+        corridor_margins(tables.corridor, shown[0], scratch.motion[MOTION.angle], excess, shown[1:])
     for k in range(x.shape[0]):
         seen[k] = x[k]
     shift = state.gusts[GUST.ahead] + error

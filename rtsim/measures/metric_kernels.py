@@ -18,8 +18,9 @@ from rtsim.kernels.compiled import inner_kernel, part
 from rtsim.loop.data import Flight
 from rtsim.places import Places
 from rtsim.protection import law_data as law
-from rtsim.protection.law_data import TorqueTables
+from rtsim.protection.law_data import SidewaysLimits, TorqueTables
 from rtsim.protection.limiter_kernels import torque_limit
+from rtsim.protection.sideways_limiter_kernels import bank_limit, sideward_limit, slip_speed
 from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, PEDAL_HALF_TRAVEL_IN, STICK_HALF_TRAVEL_IN
 
 OUTSIDE_MARGIN_KT, PERSISTENCE_S, MERGE_S = -0.5, 0.1, 0.5
@@ -91,7 +92,8 @@ METRICS = (
     Metric("mean_margin_kt", "kn", "mean corridor margin", lambda s: s.margin / s.frames, (SEARCH,)),
     Metric("proximity_kt", "kn", "smallest corridor margin, negated", lambda s: -s.margin_least, (),
            objective="corridor_proximity"),
-    Metric("flapping_peak_deg", "deg", "largest cyclic flapping relative to the mast, √(b1c² + b1s²)",
+    Metric("flapping_peak_deg", "deg",
+           "largest cyclic flapping relative to the mast, √(b1c² + b1s²), of the rotor that flaps more",
            lambda s: s.flapping_peak, flight="flapping_deg.peak", objective="flapping_peak",
            campaign=("max",)),
     Metric("flapping_peak_time_s", "s", "time of the largest flapping", lambda s: s.flapping_peak_time,
@@ -158,6 +160,11 @@ METRICS = (
            lambda s: s.lever.largest - s.lever.least, (FLIGHT, SEARCH), flight="lever.travel", search="lever.travel"),
     Metric("lever_path", "", "distance moved by the lever", lambda s: s.lever.travelled, (SEARCH,),
            search="lever.path"),
+    Metric("bank_beyond_deg", "deg", "largest bank beyond its limit, either way, negative inside",
+           lambda s: s.bank_beyond, ()),
+    Metric("bank_peak_deg", "deg", "largest bank, either way",
+           lambda s: max(abs(s.bank_least), abs(s.bank_largest)), (TRIAL,), campaign=("max",)),
+    Metric("bank_over_s", "s", "time with bank beyond its limit", lambda s: s.bank_over, (TRIAL,)),
     Metric("bank_min_deg", "deg", "smallest bank angle, left negative", lambda s: s.bank_least, (FLIGHT,),
            flight="bank_deg.min"),
     Metric("bank_max_deg", "deg", "largest bank angle, right positive", lambda s: s.bank_largest, (FLIGHT,),
@@ -176,6 +183,10 @@ METRICS = (
            (FLIGHT,), flight="heading_deg.max_error"),
     Metric("sideslip_max_deg", "deg", "largest magnitude of the sideslip", lambda s: s.sideslip, (FLIGHT,),
            flight="sideslip_deg.max"),
+    Metric("sideslip_beyond_kt", "kn", "largest sideward airspeed beyond its limit, either way, negative inside",
+           lambda s: s.sideslip_beyond, ()),
+    Metric("sideslip_over_s", "s", "time with sideward airspeed along body y beyond its limit",
+           lambda s: s.sideslip_over, (TRIAL,)),
     Metric("lateral_max_kt", "kn", "largest magnitude of the sideways airspeed", lambda s: s.lateral, (FLIGHT,),
            flight="lateral_kt.max"),
     Metric("point_max_error_m", "m", "largest distance from the point over the ground that is held; 0 without one",
@@ -271,7 +282,7 @@ CONTROL = Places(
 SUM = Places(
     # What the flight is judged by, set before it.
     "flapping_limit", "torque_cruise", "torque_takeoff", "takeoff_nacelle", "takeoff_airspeed",
-    "load_limit_max", "load_limit_min", "pitch_limit",
+    "load_limit_max", "load_limit_min", "pitch_limit", ("sideways", len(SidewaysLimits._fields)), "alpha_speed",
     # How it ended, set after it.
     "ended", "yielded",
     "frames", "time",
@@ -280,7 +291,8 @@ SUM = Places(
     "airspeed_squares", "airspeed_error", "airspeed", "nacelle", "nacelle_error", "nacelle_rate",
     "altitude", "height_lost", "height_gained", "pitch_least", "pitch_largest", "pitch_rate_squares",
     ("stick", CONTROL.size), ("lever", CONTROL.size), ("lateral_stick", CONTROL.size), ("pedal", CONTROL.size),
-    "stop_frames", "bank_least", "bank_largest", "bank_squares", "bank_error", "heading", "heading_squares",
+    "stop_frames", "bank_least", "bank_largest", "bank_beyond", "bank_over", "sideslip_beyond",
+    "sideslip_over", "bank_squares", "bank_error", "heading", "heading_squares",
     "heading_error", "sideslip", "lateral", "track_error", "point_error", "north", "north_least", "north_largest",
     "east", "east_least", "east_largest", "away",
     "torque_share", "torque_over", "torque", "power", "power_largest", "fuel_flow", "load_largest", "load_least",
@@ -417,8 +429,9 @@ def _law_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> None
 @inner_kernel
 def _load_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> None:
     """Loads on rotors, masts and engines."""
-    flapping, time = row[COLUMN.flapping_deg], row[COLUMN.time_s]
-    torque, power, load = row[COLUMN.mast_torque_inlb], row[COLUMN.engine_power_shp], row[COLUMN.load_factor]
+    flapping = max(row[COLUMN.flapping_deg], row[COLUMN.flapping_left_deg], row[COLUMN.flapping_right_deg])
+    torque = max(row[COLUMN.mast_torque_inlb], row[COLUMN.mast_torque_left_inlb], row[COLUMN.mast_torque_right_inlb])
+    time, power, load = row[COLUMN.time_s], row[COLUMN.engine_power_shp], row[COLUMN.load_factor]
     if first:
         sums[SUM.flapping_late_peak] = math.nan
         sums[SUM.torque], sums[SUM.power_largest] = torque, power
@@ -448,13 +461,37 @@ def _load_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> Non
 
 
 @inner_kernel
-def _lateral_step(sums: FloatArray, row: FloatArray, first: bool) -> None:
+def _beyond_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> None:
+    """Bank and sideslip against their limits."""
+    place = SUM.sideways
+    limits = SidewaysLimits(
+        sums[place], sums[place + 1], sums[place + 2], sums[place + 3], sums[place + 4], sums[place + 5],
+        sums[place + 6],
+    )  # fmt: skip
+    airspeed, climb = row[COLUMN.airspeed_kt] * KNOT, row[COLUMN.climb_rate_m_s]
+    beyond = abs(row[COLUMN.bank_deg]) - bank_limit(limits, row[COLUMN.nacelle_deg] * DEGREE) / DEGREE
+    if first or beyond > sums[SUM.bank_beyond]:
+        sums[SUM.bank_beyond] = beyond
+    if beyond > 0.0:
+        sums[SUM.bank_over] += dt
+    slip = row[COLUMN.sideslip_deg] * DEGREE
+    sideward = slip_speed(slip, airspeed, climb, sums[SUM.alpha_speed])
+    beyond = (abs(sideward) - sideward_limit(limits, airspeed)) / KNOT
+    if first or beyond > sums[SUM.sideslip_beyond]:
+        sums[SUM.sideslip_beyond] = beyond
+    if beyond > 0.0:
+        sums[SUM.sideslip_over] += dt
+
+
+@inner_kernel
+def _lateral_step(sums: FloatArray, row: FloatArray, first: bool, dt: float) -> None:
     """The motion out of the plane of symmetry, and where the aircraft is."""
     bank, heading = row[COLUMN.bank_deg], row[COLUMN.heading_deg]
     if first:
         sums[SUM.bank_least] = sums[SUM.bank_largest] = bank
     sums[SUM.bank_least] = min(sums[SUM.bank_least], bank)
     sums[SUM.bank_largest] = max(sums[SUM.bank_largest], bank)
+    _beyond_step(sums, row, first, dt)
     error = bank - row[COLUMN.bank_reference_deg]
     sums[SUM.bank_squares] += error * error
     sums[SUM.bank_error] = max(sums[SUM.bank_error], abs(error))
@@ -506,7 +543,7 @@ def metrics_step(sums: FloatArray, row: FloatArray, programme: FloatArray, dt: f
     lateral_stick, pedal = row[COLUMN.lateral_stick] * STICK_HALF_TRAVEL_IN, row[COLUMN.pedal] * PEDAL_HALF_TRAVEL_IN
     _control_step(sums, SUM.lateral_stick, lateral_stick, first, running, dt)
     _control_step(sums, SUM.pedal, pedal, first, running, dt)
-    _lateral_step(sums, row, first)
+    _lateral_step(sums, row, first, dt)
     if row[COLUMN.control_on_stop] > 0.5:
         sums[SUM.stop_frames] += 1.0
     height = row[COLUMN.altitude_m] - row[COLUMN.altitude_reference_m]

@@ -25,9 +25,9 @@ from rtsim.programme import Programme
 from rtsim.protection.limits import load_limits
 from rtsim.units import to_deg
 
-SECONDARY_LIMITS = ("flapping", "torque", "load_factor", "pitch", "control")
-"""Limits besides the corridor, by name: flapping, 1.02 of the torque limit, load factor, pitch, and keeping control to
-the end."""
+SECONDARY_LIMITS = ("flapping", "torque", "load_factor", "pitch", "bank", "sideslip", "control")
+"""Limits besides the corridor, by name: flapping, 1.02 of the torque limit, load factor, pitch, bank, sideslip, and
+keeping control to the end."""
 LEAVABLE = ("corridor", *SECONDARY_LIMITS, "height")
 """What an unprotected flight can be expected to violate."""
 VACUOUS_HEIGHT = 30.0
@@ -180,6 +180,8 @@ def new_sums(profile: AircraftProfile | None = None) -> FloatArray:
     sums[SUM.flapping_limit], sums[SUM.pitch_limit] = to_deg(limits.flapping), to_deg(limits.pitch)
     sums[SUM.load_limit_max], sums[SUM.load_limit_min] = limits.load_factor_max, limits.load_factor_min
     sums[SUM.torque_cruise : SUM.torque_cruise + len(limits.torque)] = limits.torque
+    sums[SUM.sideways : SUM.sideways + len(limits.sideways)] = limits.sideways
+    sums[SUM.alpha_speed] = limits.alpha_speed
     return sums
 
 
@@ -264,6 +266,8 @@ def violations(numbers: FloatArray) -> dict[str, BoolArray]:
         "torque": numbers[:, VALUE.torque_over_s] > 0.0,
         "load_factor": numbers[:, VALUE.load_factor_beyond] > 0.0,
         "pitch": numbers[:, VALUE.pitch_beyond_deg] > 0.0,
+        "bank": numbers[:, VALUE.bank_over_s] > 0.0,
+        "sideslip": numbers[:, VALUE.sideslip_over_s] > 0.0,
         "control": numbers[:, VALUE.completed] == 0.0,
         "height": numbers[:, VALUE.height_lost_m] > VACUOUS_HEIGHT,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,9 +12,10 @@ from rtsim.aircraft.condition import AircraftCondition
 from rtsim.aircraft.variables import required_position
 from rtsim.arrays import FloatArray
 from rtsim.choices import CORRIDOR_NAMES
-from rtsim.corridor.boundaries import Boundary, Corridor, load_corridor
+from rtsim.corridor.boundaries import STRAIGHT, Boundary, Corridor, Turning, load_corridor
 from rtsim.errors import InputError
 from rtsim.lpv.database import Database
+from rtsim.lpv.lateral import LateralData
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import Limits, load_limits
 from rtsim.units import deg, to_deg, to_kt
@@ -61,19 +63,9 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
     """
     limits = load_limits(database.profile) if limits is None else limits
     level = database.level_layer
-    rows = database.nacelle >= 0.0  # not those of a lower rotor speed
-    angles, valid = database.nacelle[rows], database.valid[level][:, rows]
-    pitch = database.x_ref[level][:, rows, required_position(database.states, "pitch", "the boundary")]
-    torque = database.y_ref[level][:, rows, required_position(database.outputs, "torque", "the boundary")]
-    low, high = np.empty(angles.size), np.empty(angles.size)
-    for j, angle in enumerate(angles):
-        good = np.flatnonzero(valid[:, j])
-        speeds = database.airspeed[good]
-        spare = MODEL_PITCH - pitch[good, j]
-        bound = np.array([torque_limit(limits.torque, speed, angle) for speed in speeds])
-        middle = int(np.argmin(torque[good, j]))
-        low[j] = _crossing(speeds[middle::-1], spare[middle::-1])
-        high[j] = _crossing(speeds[middle:], (bound - torque[good, j])[middle:])
+    angles, low, high = _trim_lines(
+        database, limits, database.x_ref[level], database.y_ref[level], database.valid[level]
+    )
     published = _chart("design", database)
     downstop = float(high[0])
     off_stop = angles > published.downstop_nacelle + 1e-9
@@ -87,6 +79,58 @@ def model_corridor(database: Database, limits: Limits | None = None) -> Corridor
         high=Boundary(angles, np.minimum.accumulate(high), "mast torque or end of the trims", _TRIMS),
         downstop_speed=min(downstop, published.downstop_speed),
     )
+
+
+def _trim_lines(
+    database: Database, limits: Limits, x_ref: FloatArray, y_ref: FloatArray, valid: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Nacelle angles, and the airspeeds between which trims exist and keep their attitude and their torque."""
+    rows = database.nacelle >= 0.0  # not those of a lower rotor speed
+    angles, exists = database.nacelle[rows], valid[:, rows]
+    pitch = x_ref[:, rows, required_position(database.states, "pitch", "the boundary")]
+    torque = y_ref[:, rows, required_position(database.outputs, "torque", "the boundary")]
+    low, high = np.empty(angles.size), np.empty(angles.size)
+    for j, angle in enumerate(angles):
+        good = np.flatnonzero(exists[:, j])
+        if not good.size:
+            low[j] = high[j] = np.nan
+            continue
+        speeds = database.airspeed[good]
+        spare = MODEL_PITCH - pitch[good, j]
+        bound = np.array([torque_limit(limits.torque, speed, angle) for speed in speeds])
+        middle = int(np.argmin(torque[good, j]))
+        low[j] = _crossing(speeds[middle::-1], spare[middle::-1])
+        high[j] = _crossing(speeds[middle:], (bound - torque[good, j])[middle:])
+    return angles, low, high
+
+
+def turning_of(database: Database) -> Turning:
+    """How far a turn moves the sides of a corridor, from the database's trims that carry more than the weight.
+
+    Both sides are those of ``model_corridor``, of straight flight and of the largest load factor that trims; what lies
+    between them is taken to grow with the load factor, and is smoothed over three nacelle angles, since the trims end
+    from one airspeed of the grid to the next.
+
+    Args:
+        database: The aircraft; without a lateral half it does not turn.
+    """
+    return STRAIGHT if database.lateral is None else _turning(database)
+
+
+@functools.lru_cache(maxsize=8)
+def _turning(database: Database) -> Turning:
+    data, level, limits = LateralData.of(database), database.level_layer, load_limits(database.profile)
+    angles, low, high = _trim_lines(
+        database, limits, database.x_ref[level], database.y_ref[level], database.valid[level]
+    )
+    moved = np.zeros((2, angles.size))
+    for k, load in enumerate(data.load_factor):
+        _, *lines = _trim_lines(database, limits, data.loaded_x_ref[k], data.loaded_y_ref[k], data.loaded_valid[k])
+        slope = (np.array(lines) - (low, high)) / (load - 1.0)
+        moved = np.where(np.isfinite(slope), slope, moved)
+    wide = np.pad(moved, ((0, 0), (1, 1)), mode="edge")
+    smooth = (wide[:, :-2] + wide[:, 1:-1] + wide[:, 2:]) / 3.0
+    return Turning(angles, np.maximum(smooth[0], 0.0), np.minimum(smooth[1], 0.0))
 
 
 def _samples() -> FloatArray:
@@ -118,13 +162,14 @@ def load_boundary(name: str, database: Database | None = None) -> Corridor:
     """
     if name not in CORRIDOR_NAMES:
         raise InputError("no such boundary", key="corridor", value=name, allowed=", ".join(CORRIDOR_NAMES))
-    if name != "model":
-        return load_corridor(name) if database is None else _chart(name, database)
+    if name != "model" and database is None:
+        return load_corridor(name)
     if database is None:
         from rtsim.lpv.files.storage import load_database
 
         database = load_database()
-    return model_corridor(database)
+    corridor = model_corridor(database) if name == "model" else _chart(name, database)
+    return replace(corridor, turning=turning_of(database))
 
 
 def _chart(name: str, database: Database) -> Corridor:

@@ -12,6 +12,7 @@ LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
 # Reasons, as recorded: 0 none, else one more than the number of the limit in rtsim.protection.limits.LIMIT_KINDS.
 REASON_NONE, REASON_LOW, REASON_HIGH, REASON_GATE = 0, 1, 2, 3
 REASON_FLAP, REASON_TORQUE, REASON_PITCH, REASON_SINK = 6, 7, 9, 11
+REASON_BANK, REASON_SIDESLIP = 15, 16
 
 LAW = Places(
     "blend",  # what is allowed now ...
@@ -28,6 +29,13 @@ LAW = Places(
     "stick_high_reason",
     "lever_reason",
     "rate_reason",
+    "lateral_low",
+    "lateral_high",
+    "pedal_low",
+    "pedal_high",
+    "lateral_low_reason",
+    "lateral_high_reason",
+    "pedal_reason",
     "time",  # time to the corridor's boundary with the controls as they are [s]
     "side",  # its side: -1 low, 1 high, 0 none
     "margin",  # least margin predicted with the pilot's controls [m/s]
@@ -35,9 +43,13 @@ LAW = Places(
     "acted_stick",
     "acted_lever",
     "acted_rate",
+    "acted_lateral",
+    "acted_pedal",
     "stick_cause",  # reason for the change of each channel in this frame; 0 where there was none
     "lever_cause",
     "rate_cause",
+    "lateral_cause",
+    "pedal_cause",
     "started",  # ... and memory from one decision to the next
     "bias",
     "last_nacelle_rate",
@@ -45,6 +57,10 @@ LAW = Places(
     "torque_rate",
     "collective",
     "flap_bias",
+    "last_roll_rate",
+    "roll_bias",
+    "last_yaw_rate",
+    "yaw_bias",
     "recover_side",
     "override",  # 1: the pilot has switched the law's authority off
     "shift",  # place on the database's nacelle axis less the nacelle angle: below 0 while the rotors are slow [rad]
@@ -54,10 +70,12 @@ LAW = Places(
 # ... what acted last, set by law_apply ...
 # ... and memory from one decision to the next.
 
+CAUSES = (LAW.stick_cause, LAW.lever_cause, LAW.rate_cause, LAW.lateral_cause, LAW.pedal_cause)
+"""Places of the reasons for the changes, in the order of a command's channels."""
 FREE = 1e9
 """A bound that bounds nothing."""
 CHANGE_STICK, CHANGE_LEVER, CHANGE_RATE = 1e-4, 1e-4, 1e-5
-"""Changes smaller than these are rounding, not interventions [-, -, rad/s]."""
+"""Changes smaller than these are rounding, not interventions; sticks and pedals, lever, nacelles [-, -, rad/s]."""
 
 WORK_SIZE = 2 * CELL.size + OUT.size
 """Length of the scratch array of the laws."""
@@ -126,6 +144,26 @@ class LawSettings(NamedTuple):
     """Full: pitch attitude kept to [rad]."""
     pitch_frequency: float
     """Full: how sharply pitch may approach it [rad/s]."""
+    turn_lead: float
+    """How far ahead the bank is taken to grow as it does, for the corridor of the turn [s]."""
+    turn_margin: float
+    """Full: corridor margin that a turn must leave [m/s]."""
+    turn_time: float
+    """Full: how far ahead that margin is taken to shrink as it does [s]."""
+    bank_least: float
+    """Full: bank that is always allowed [rad]."""
+    bank_buffer: float
+    """Full: distance kept from the limit of bank [rad]."""
+    bank_frequency: float
+    """Full: how sharply bank may approach what is allowed [rad/s]."""
+    sideslip_buffer: float
+    """Full: distance kept from the limit of sideslip [m/s]."""
+    sideslip_frequency: float
+    """Full: how sharply sideslip may approach it [rad/s]."""
+    drift_time: float
+    """Full: time in which sideward flight may come to its limit [s]."""
+    roll_filter: float
+    """Full: time constant with which the rolling and yawing that the model misses are learned [s]."""
 
 
 class TorqueTables(NamedTuple):
@@ -154,6 +192,25 @@ class SinkTables(NamedTuple):
     """Height above that, per sink rate allowed besides [s]."""
 
 
+class SidewaysLimits(NamedTuple):
+    """The limits out of the plane of symmetry. SI and radians; infinite where an aircraft's data name none."""
+
+    bank: float
+    """Bank allowed up to ``bank_nacelle`` [rad]."""
+    bank_helicopter: float
+    """Bank allowed in helicopter mode, linear between [rad]."""
+    bank_nacelle: float
+    """Nacelle angle up to which the former holds [rad]."""
+    slow: float
+    """Sideward airspeed allowed in slow flight [m/s]."""
+    fast: float
+    """Sideward airspeed allowed in fast flight, linear between [m/s]."""
+    slow_below: float
+    """Airspeed up to which the former holds [m/s]."""
+    fast_above: float
+    """Airspeed from which the latter holds [m/s]."""
+
+
 class ProtectionTables(NamedTuple):
     """One compiled law; read-only."""
 
@@ -169,5 +226,7 @@ class ProtectionTables(NamedTuple):
     """The torque it keeps to."""
     sink: SinkTables
     """The sink rate it keeps to."""
+    sideways: SidewaysLimits
+    """The bank and the sideslip it keeps to."""
     settings: LawSettings
     """Its numbers."""

@@ -11,10 +11,12 @@ import math
 
 from rtsim.arrays import FloatArray
 from rtsim.command import SENSOR
+from rtsim.corridor.corridor_kernels import turn_excess
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.protection import prediction_kernels as model
 from rtsim.protection.law_data import *  # noqa: F403  # one place to take a law's kernels and its constants from
 from rtsim.protection.law_data import (
+    CAUSES,
     CHANGE_LEVER,
     CHANGE_RATE,
     CHANGE_STICK,
@@ -28,7 +30,14 @@ from rtsim.protection.law_data import (
 from rtsim.protection.limiter_kernels import allowed_sink as allowed_sink  # noqa: PLC0414
 from rtsim.protection.limiter_kernels import blend_recovery, clip, govern, limit_lever, limit_stick
 from rtsim.protection.limiter_kernels import torque_limit as torque_limit  # noqa: PLC0414
-from rtsim.protection.prediction_kernels import accelerations, model_at, roll_out
+from rtsim.protection.prediction_kernels import accelerations, model_at, roll_out, turn_model, turn_motion
+from rtsim.protection.sideways_limiter_kernels import (
+    free_sideways,
+    limit_sideways,
+    moves_out_of_symmetry,
+    worst_flapping,
+    worst_torque,
+)
 
 
 @inner_kernel
@@ -42,6 +51,7 @@ def law_release(state: FloatArray) -> None:
     state[LAW.stick_low], state[LAW.stick_high] = -FREE, FREE
     state[LAW.lever_low], state[LAW.lever_high] = -FREE, FREE
     state[LAW.rate_low], state[LAW.rate_high] = -FREE, FREE
+    free_sideways(state)
 
 
 @inner_kernel
@@ -104,9 +114,16 @@ def _look_ahead(
     if state[LAW.started] == 0.0:
         state[LAW.acted_stick], state[LAW.acted_lever], state[LAW.acted_rate] = asked[0], asked[1], 0.0
         state[LAW.collective] = asked[1]
+        state[LAW.acted_lateral], state[LAW.acted_pedal] = clip(command[3], -1.0, 1.0), clip(command[4], -1.0, 1.0)
         state[LAW.last_nacelle_rate] = rate
     acting = (state[LAW.acted_stick], state[LAW.acted_lever])
     model_at(tables.model, airspeed, angle + state[LAW.shift], cell)
+    bank, rolling = sensors[SENSOR.bank], sensors[SENSOR.roll_rate]
+    if tables.model.turns != 0 and (bank != 0.0 or rolling != 0.0):
+        # A turn that is begun is watched as what it becomes, one that is ended as what it is.
+        coming = max(abs(bank), abs(bank + settings.turn_lead * rolling))
+        turn_model(cell, 1.0 + turn_excess(bank), turn_excess(coming))
+        z = turn_motion(sensors)
 
     _, _, _, expected, _ = accelerations(cell, z, acting, (0.0, rate))
     missing = clip(sensors[SENSOR.airspeed_rate] - expected, -settings.bias_limit, settings.bias_limit)
@@ -133,7 +150,8 @@ def _look_ahead(
 
 @inner_kernel
 def _remember(state: FloatArray, sensors: FloatArray) -> None:
-    state[LAW.last_torque] = sensors[SENSOR.mast_torque]
+    state[LAW.last_torque] = worst_torque(sensors)
+    state[LAW.last_roll_rate], state[LAW.last_yaw_rate] = sensors[SENSOR.roll_rate], sensors[SENSOR.yaw_rate]
     state[LAW.started] = 1.0
 
 
@@ -145,7 +163,7 @@ def law_watch(
 
     Args:
         state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        command: Stick, lever, nacelle rate [rad/s] that would act without the law.
+        command: Stick, lever, nacelle rate [rad/s], lateral stick, pedals that would act without the law.
         work: Scratch of WORK_SIZE numbers.
     """
     seen, _, _, _ = _look_ahead(tables, state, sensors, command, work)
@@ -161,7 +179,7 @@ def law_decide(
 
     Args:
         state: Law state, updated in place, shape (LAW_STATE_SIZE,).
-        command: Stick, lever, nacelle rate [rad/s] that would act without the law.
+        command: Stick, lever, nacelle rate [rad/s], lateral stick, pedals that would act without the law.
         work: Scratch of WORK_SIZE numbers.
     """
     seen, z, asked, nacelle = _look_ahead(tables, state, sensors, command, work)
@@ -178,8 +196,10 @@ def law_decide(
         flight = (airspeed, angle, sensors[SENSOR.climb_rate])
         scratch = (cell, target, out)
         blend_recovery(tables, state, scratch, z, asked, nacelle, command[2], flight, sensors[SENSOR.altitude])
-        limit_stick(tables, state, cell, z, acting, rate, sensors[SENSOR.flapping])
-        limit_lever(tables, state, cell, sensors[SENSOR.mast_torque], airspeed, angle)
+        limit_stick(tables, state, cell, z, acting, rate, worst_flapping(sensors))
+        limit_lever(tables, state, cell, worst_torque(sensors), airspeed, angle)
+        if tables.model.turns != 0 and moves_out_of_symmetry(sensors, command):
+            limit_sideways(tables, state, cell, sensors)
     _remember(state, sensors)
 
 
@@ -189,10 +209,10 @@ def law_apply(tables: ProtectionTables, state: FloatArray, command: FloatArray, 
 
     Args:
         state: Law state; what acted and why is noted in it.
-        command: Stick, lever, nacelle rate [rad/s] without the law.
+        command: Stick, lever, nacelle rate [rad/s], lateral stick, pedals without the law.
         applied: Written: the same with the law; may be the same array.
     """
-    stick, lever, rate = command[0], command[1], command[2]
+    stick, lever, rate, lateral, pedal = command[0], command[1], command[2], command[3], command[4]
     # A command that is no number is answered with what acted last.
     if not math.isfinite(stick):
         stick = state[LAW.acted_stick]
@@ -200,18 +220,37 @@ def law_apply(tables: ProtectionTables, state: FloatArray, command: FloatArray, 
         lever = state[LAW.acted_lever]
     if not math.isfinite(rate):
         rate = 0.0
-    applied[0], applied[1], applied[2] = stick, lever, rate
-    state[LAW.stick_cause], state[LAW.lever_cause], state[LAW.rate_cause] = 0.0, 0.0, 0.0
+    if not math.isfinite(lateral):
+        lateral = state[LAW.acted_lateral]
+    if not math.isfinite(pedal):
+        pedal = state[LAW.acted_pedal]
+    applied[0], applied[1], applied[2], applied[3], applied[4] = stick, lever, rate, lateral, pedal
+    for place in CAUSES:
+        state[place] = 0.0
     if tables.law >= LAW_GOVERNOR and state[LAW.override] == 0.0:
         applied[2] = clip(rate, state[LAW.rate_low], state[LAW.rate_high])
         if abs(applied[2] - rate) > CHANGE_RATE:
             state[LAW.rate_cause] = state[LAW.rate_reason]
         if tables.law == LAW_FULL:
             _apply_hands(state, stick, lever, applied)
+            _apply_sideways(state, lateral, pedal, applied)
     state[LAW.acted] = 1.0
     state[LAW.acted_stick] = clip(applied[0], -1.0, 1.0)
     state[LAW.acted_lever] = clip(applied[1], 0.0, 1.0)
     state[LAW.acted_rate] = applied[2]
+    state[LAW.acted_lateral], state[LAW.acted_pedal] = clip(applied[3], -1.0, 1.0), clip(applied[4], -1.0, 1.0)
+
+
+@inner_kernel
+def _apply_sideways(state: FloatArray, lateral: float, pedal: float, applied: FloatArray) -> None:
+    applied[3] = clip(lateral, state[LAW.lateral_low], state[LAW.lateral_high])
+    if applied[3] > lateral + CHANGE_STICK:
+        state[LAW.lateral_cause] = state[LAW.lateral_low_reason]
+    elif applied[3] < lateral - CHANGE_STICK:
+        state[LAW.lateral_cause] = state[LAW.lateral_high_reason]
+    applied[4] = clip(pedal, state[LAW.pedal_low], state[LAW.pedal_high])
+    if abs(applied[4] - pedal) > CHANGE_STICK:
+        state[LAW.pedal_cause] = state[LAW.pedal_reason]
 
 
 @inner_kernel
@@ -262,7 +301,7 @@ def protect(
         state: Law state, updated in place.
         frame: Number of the frame; the law decides when it is a multiple of ``tables.every``.
         sensors: What the law may know; read only in frames in which it decides.
-        command: Stick, lever, nacelle rate [rad/s] without the law.
+        command: Stick, lever, nacelle rate [rad/s], lateral stick, pedals without the law.
         applied: Written: the same with the law; may be the same array.
         work: Scratch of WORK_SIZE numbers.
     """

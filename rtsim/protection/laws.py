@@ -12,12 +12,12 @@ import numpy as np
 
 from rtsim.aircraft.condition import AircraftName
 from rtsim.choices import CorridorName
-from rtsim.command import CHANNELS, Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.command import CHANNELS, LATERAL_CHANNELS, Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
 from rtsim.protection import law_data as data
-from rtsim.protection import law_kernels, limiter_kernels
+from rtsim.protection import law_kernels, limiter_kernels, sideways_limiter_kernels
 from rtsim.protection.law_data import LawSettings
 from rtsim.protection.limits import LIMIT_KINDS, load_limits
 from rtsim.protection.monitor import sensor_array
@@ -32,7 +32,7 @@ LAW_PLUGIN = PluginKind(
     page="docs/protection.md",
 )
 """A protection law as plug-in."""
-_CLIPS = (data.REASON_FLAP, data.REASON_PITCH, data.REASON_TORQUE)
+_CLIPS = (data.REASON_FLAP, data.REASON_PITCH, data.REASON_TORQUE, data.REASON_BANK, data.REASON_SIDESLIP)
 _WARNING_TIME = 5.0
 
 
@@ -67,7 +67,7 @@ class BuiltInLaw:
         self._frame = 0
         self._state = np.zeros(data.LAW.size)
         self._work = np.zeros(data.WORK_SIZE)
-        self._applied = np.zeros(3)
+        self._applied = np.zeros(len(CHANNELS))
         law_kernels.law_start(self._tables, self._state)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BuiltInLaw:
@@ -102,24 +102,24 @@ class BuiltInLaw:
                 self.name, self._database, dt=dt, boundary=self._boundary, settings=self._settings
             )
             self._dt = dt
-        asked = np.array([command.stick, command.lever, command.nacelle_rate])
+        asked = np.array(command.values)
         known = sensor_array(sensors)
         law_kernels.protect(self._tables, self._state, self._frame, known, asked, self._applied, self._work)
         self._frame += 1
-        stick, lever, rate = (float(value) for value in self._applied)
-        return Command(stick, lever, rate, command.lateral_stick, command.pedal), self._interventions(sensors, asked)
+        limited = Command(*(float(value) for value in self._applied))
+        return limited, self._interventions(sensors, asked)
 
     def _interventions(self, sensors: Sensors, asked: np.ndarray[tuple[int], Any]) -> list[Intervention]:
         state = self._state
         if self._tables.law == data.LAW_MONITOR:
             return self._warnings(asked)
         found = []
-        causes = (data.LAW.stick_cause, data.LAW.lever_cause, data.LAW.rate_cause)
-        for place, (channel, cause) in enumerate(zip(CHANNELS[:3], causes, strict=True)):
+        for place, (channel, cause) in enumerate(zip(CHANNELS, data.CAUSES, strict=True)):
             reason = int(state[cause])
             if reason == data.REASON_NONE:
                 continue
-            kind: Literal["limit", "reverse", "blend", "clip"] = "clip" if reason in _CLIPS else "blend"
+            sideways = channel in LATERAL_CHANNELS
+            kind: Literal["limit", "reverse", "blend", "clip"] = "clip" if sideways or reason in _CLIPS else "blend"
             if channel == "nacelle_rate":
                 kind = "reverse" if state[data.LAW.kind] != 0.0 else "limit"
             found.append(
@@ -148,13 +148,21 @@ class BuiltInLaw:
     def _margin(self, reason: int, sensors: Sensors) -> float:
         """Margin to the limit that asked for an intervention; the least predicted one for the corridor."""
         limits = load_limits(self._database.profile)
+        known = sensor_array(sensors)
         if reason == data.REASON_FLAP:
-            return float(limits.flapping - abs(sensors.flapping))
+            return float(limits.flapping - sideways_limiter_kernels.worst_flapping(known))
         if reason == data.REASON_PITCH:
             return float(limits.pitch - abs(sensors.pitch))
+        if reason == data.REASON_BANK:
+            allowed = sideways_limiter_kernels.bank_limit(limits.sideways, sensors.nacelle_angle)
+            return float(allowed - abs(sensors.bank))
+        if reason == data.REASON_SIDESLIP:
+            allowed = sideways_limiter_kernels.sideward_limit(limits.sideways, sensors.airspeed)
+            speed = sideways_limiter_kernels.sideward_speed(known, self._tables.model.alpha_speed)
+            return float(allowed - abs(speed))
         if reason == data.REASON_TORQUE:
             bound = limiter_kernels.torque_limit(limits.torque, sensors.airspeed, sensors.nacelle_angle)
-            return float(1.0 - sensors.mast_torque / bound)
+            return float(1.0 - sideways_limiter_kernels.worst_torque(known) / bound)
         if reason == data.REASON_SINK:
             return float(
                 limiter_kernels.allowed_sink(limits.sink, sensors.airspeed, sensors.altitude) + sensors.climb_rate

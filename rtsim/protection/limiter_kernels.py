@@ -25,7 +25,7 @@ from rtsim.protection.law_data import (
     SinkTables,
     TorqueTables,
 )
-from rtsim.protection.prediction_kernels import accelerations, affine, model_at, roll_out, speed_range
+from rtsim.protection.prediction_kernels import accelerations, affine, model_at, roll_out, speed_range, turn_model
 
 
 @inner_kernel
@@ -192,7 +192,7 @@ def _recover(
     """Recovery stick and lever: the regulator about the trim of an airspeed well inside the corridor."""
     settings = tables.settings
     airspeed, angle, climb = flight
-    low, high = speed_range(tables.corridor, angle)
+    low, high = speed_range(tables.corridor, angle, cell[model.CELL.excess])
     aim = airspeed
     if state[LAW.recover_side] < 0.0:
         aim = max(airspeed, low + settings.recovery_margin)
@@ -210,6 +210,8 @@ def _recover(
         step *= max(0.0, 1.0 - excess / allowed)
         state[LAW.blend_reason] = REASON_SINK
     model_at(tables.model, airspeed + step, angle + state[LAW.shift], target)
+    if cell[model.CELL.load] != 1.0:
+        turn_model(target, cell[model.CELL.load], cell[model.CELL.excess])
     d0 = z[0] - target[model.CELL.state]
     d1 = z[1] - target[model.CELL.state + 1]
     d2 = z[2] - target[model.CELL.state + 2]

@@ -12,14 +12,14 @@ import numpy as np
 from rtsim.aircraft.profile import AircraftProfile, Part, xv15_profile
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.protection.law_data import LawSettings, SinkTables, TorqueTables
+from rtsim.protection.law_data import LawSettings, SidewaysLimits, SinkTables, TorqueTables
 from rtsim.protection.model import RegulatorWeights
 from rtsim.protection.monitor_kernels import LIMIT_NUMBERS, LIMIT_WORDS, RotorTables
 from rtsim.units import DEGREE, HORSEPOWER, INCH_POUND, KNOT, deg, kt
 
 LIMIT_KINDS = tuple(name for name in LIMIT_WORDS if name != "time_to_limit")
 """Limits by name; the number of a limit is its place here, and a recorded reason is that number plus one."""
-OPTIONAL = ("engine_power", "transmission", "rotor_endurance")
+OPTIONAL = ("engine_power", "transmission", "rotor_endurance", "bank_attitude", "sideslip")
 """Limits that an aircraft's data need not name; they are not watched then."""
 _SI = {"_deg_s": DEGREE, "_deg": DEGREE}
 """SI value of one unit of a limit, by how its key ends; 1 for others."""
@@ -34,6 +34,10 @@ class Limits(SimpleNamespace):
     """Sink rate."""
     rotor: RotorTables
     """Transmission and rotor endurance."""
+    sideways: SidewaysLimits
+    """Bank and sideslip."""
+    alpha_speed: float
+    """Added to the airspeed where sideslip is an angle, as for scheduling [m/s]."""
     plant_guard: float
     """Distance a law's low side keeps from where the plant's unstalled trims end [m/s]."""
 
@@ -45,8 +49,9 @@ def load_limits(profile: AircraftProfile | None = None) -> Limits:
     Raises:
         InputError: A value is missing or out of range.
     """
-    data = _part(profile).table("limits")
-    engines = (xv15_profile() if profile is None else profile).systems.table("engine")
+    profile = xv15_profile() if profile is None else profile
+    data = profile.protection.table("limits")
+    engines = profile.systems.table("engine")
     return Limits(
         rotor=_rotor(data, engines=engines.number("engines", low=1, high=8)),
         torque=TorqueTables(
@@ -61,11 +66,28 @@ def load_limits(profile: AircraftProfile | None = None) -> Limits:
             height=data.number("sink_height_m", low=0.0, high=1e4),
             time=data.number("sink_time_s", low=0.1, high=1e4),
         ),
+        sideways=_sideways(data),
+        alpha_speed=profile.dimensions.number("scheduling_speed_m_s", low=0.1, high=100.0),
         plant_guard=kt(data.number("plant_guard_kt", low=0.0, high=100.0)),
         **{
             name: data.number(key, low=low, high=high) * next((_SI[end] for end in _SI if key.endswith(end)), 1.0)
             for name, (key, low, high) in LIMIT_NUMBERS.items()
         },
+    )
+
+
+def _sideways(data: Part) -> SidewaysLimits:
+    """Limits of bank and of sideslip, where the data name them."""
+    if not data.has("bank_deg"):
+        return SidewaysLimits(math.inf, math.inf, 0.0, math.inf, math.inf, 0.0, 1.0)
+    return SidewaysLimits(
+        bank=deg(data.number("bank_deg", low=1.0, high=80.0)),
+        bank_helicopter=deg(data.number("bank_helicopter_deg", low=1.0, high=80.0)),
+        bank_nacelle=deg(data.number("bank_up_to_nacelle_deg", low=0.0, high=89.0)),
+        slow=kt(data.number("sideward_slow_kt", low=1.0, high=300.0)),
+        fast=kt(data.number("sideward_fast_kt", low=1.0, high=300.0)),
+        slow_below=kt(data.number("sideward_slow_below_kt", low=0.0, high=300.0)),
+        fast_above=kt(data.number("sideward_fast_above_kt", low=1.0, high=300.0)),
     )
 
 
@@ -188,6 +210,7 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
     """
     part = _part(profile)
     law, governor, full = part.table("law"), part.table("governor"), part.table("full")
+    turn = part.table("turn") if part.has("turn") else xv15_profile().protection.table("turn")
     return LawSettings(
         period=frames_per_decision(profile, dt=dt) * dt,
         horizon=law.number("horizon_s", low=0.1, high=60.0),
@@ -219,6 +242,16 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
         collective_lag=full.number("collective_lag_s", low=0.001, high=10.0),
         pitch=deg(full.number("pitch_deg", low=1.0, high=80.0)),
         pitch_frequency=full.number("pitch_frequency_rad_s", low=0.01, high=20.0),
+        turn_lead=turn.number("lead_s", low=0.0, high=5.0),
+        turn_margin=kt(turn.number("margin_kt", low=-50.0, high=100.0)),
+        turn_time=turn.number("margin_lead_s", low=0.0, high=10.0),
+        bank_least=deg(turn.number("bank_least_deg", low=0.0, high=60.0)),
+        bank_buffer=deg(turn.number("bank_buffer_deg", low=0.0, high=30.0)),
+        bank_frequency=turn.number("bank_frequency_rad_s", low=0.01, high=20.0),
+        sideslip_buffer=kt(turn.number("sideward_buffer_kt", low=0.0, high=50.0)),
+        sideslip_frequency=turn.number("sideslip_frequency_rad_s", low=0.01, high=20.0),
+        drift_time=turn.number("drift_time_s", low=0.1, high=60.0),
+        roll_filter=turn.number("roll_filter_s", low=0.01, high=60.0),
     )
 
 

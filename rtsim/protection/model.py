@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.aircraft.variables import required_position
+from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_STATES, position, required_position
 from rtsim.arrays import FloatArray
 from rtsim.lpv.database import Database
-from rtsim.lpv.reduction import settle, settled
+from rtsim.lpv.lateral import LateralData
+from rtsim.lpv.reduction import eliminated, settle, settled
+from rtsim.lpv.tables import scheduling_speed
 from rtsim.nacelle.switch import load_nacelle_tables
 from rtsim.protection import prediction_kernels as kernels
 from rtsim.protection.prediction_kernels import ModelTables
@@ -18,6 +20,8 @@ from rtsim.units import GRAVITY
 
 _RIGID = ("u", "w", "q", "pitch")
 _CONTROLS = ("stick", "lever")
+_SIDEWAYS = ("v", "p", "r", "bank", "heading")
+_LATERAL_CONTROLS = ("lateral_stick", "pedal")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +98,22 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
         cells[..., place] = value
         cells[..., place + 1 : place + 4] = with_state[..., :3]
         cells[..., place + 4 : place + 7] = with_input
+    cells[..., kernels.CELL.load] = 1.0
+    if database.lateral is not None:
+        data = LateralData.of(database)
+        lateral = _lateral_rows(data)
+        cells[..., kernels.CELL.side : kernels.CELL.side + lateral.shape[-1]] = lateral
+        flapping = [required_position(database.states, name, "protection") for name in ("flap_1c", "flap_1s")]
+        loaded = np.concatenate(
+            [
+                data.loaded_x_ref[0][..., slow] - database.x_ref[level][..., slow],
+                (data.loaded_u_ref[0] - database.u_ref[level])[..., inputs[:2]],
+                (data.loaded_y_ref[0] - database.y_ref[level])[..., [torque]],
+                (data.loaded_x_ref[0] - database.x_ref[level])[..., flapping],
+            ],
+            axis=-1,
+        )
+        cells[..., kernels.CELL.turn : kernels.CELL.turn + 9] = loaded / (data.load_factor[0] - 1.0)
     gain = regulator_gains(a, b[..., :2], z, weights)
     cells[..., kernels.CELL.gain : kernels.CELL.gain + 8] = gain.reshape(*z.shape[:2], 8)
     nacelle = load_nacelle_tables(database.profile)
@@ -105,7 +125,18 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
         nacelle_frequency=nacelle.frequency,
         forward_stop=nacelle.forward_stop,
         aft_stop=nacelle.aft_stop,
+        alpha_speed=scheduling_speed(database),
+        turns=int(database.lateral is not None),
     )
+
+
+def _lateral_rows(data: LateralData) -> FloatArray:
+    """Sideward, rolling and yawing acceleration per v, p, r, lateral stick and pedals, in level flight [V, N, 15]."""
+    kept = [position(LATERAL_STATES, name) for name in _SIDEWAYS]
+    inputs = [position(LATERAL_INPUTS, name) for name in _LATERAL_CONTROLS]
+    a, b = eliminated(data.A[0], data.B[0], kept, inputs)
+    rows = np.concatenate([a[..., :3, :3], b[..., :3, :]], axis=-1)
+    return np.asarray(rows.reshape(*rows.shape[:2], 15))
 
 
 def regulator_gains(a: FloatArray, b: FloatArray, z: FloatArray, weights: RegulatorWeights) -> FloatArray:

@@ -10,8 +10,9 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.choices import CorridorName
-from rtsim.command import SENSOR, Command, Sensors
+from rtsim.command import CHANNELS, SENSOR, Command, Sensors
 from rtsim.corridor.boundaries import LEVEL_NAMES
+from rtsim.corridor.corridor_kernels import turn_excess
 from rtsim.frame import COLUMN, QUANTITY, UNIT_SCALES
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
@@ -20,7 +21,6 @@ from rtsim.protection.boundary import load_boundary, model_corridor
 from rtsim.protection.limits import WATCHED, LimitLevels, load_levels, load_limits
 from rtsim.protection.monitor_kernels import DRIVEN, FAR, KIND, LIMIT, MonitorTables
 from rtsim.protection.tables import law_tables, sample_boundary
-from rtsim.units import DEGREE
 
 SHOWN_AS = {
     "airspeed": "airspeed_indicated",
@@ -30,6 +30,7 @@ SHOWN_AS = {
     "nacelle_ok": "failures",
 }
 """Quantities of the frame that sensors show under another name."""
+_ACTED = np.array([QUANTITY.asdict()[{"nacelle_rate": "nacelle_command_rate"}.get(name, name)] for name in CHANNELS])
 _DRIVEN = np.array([QUANTITY.asdict()[name] for name in DRIVEN.asdict()])
 _SENSED = np.array([QUANTITY.asdict()[SHOWN_AS.get(name, name)] for name in Sensors.__slots__])
 
@@ -169,7 +170,7 @@ class MarginMonitor:
             command: What acts during it.
         """
         known = sensor_array(sensors)
-        acting = np.array([command.stick, command.lever, command.nacelle_rate])
+        acting = np.array(command.values)
         law_kernels.protect(self._law, self._law_state, self._frame, known, acting, acting.copy(), self._work)
         self._frame += 1
         ahead = float(self._law_state[law_data.LAW.time])
@@ -179,7 +180,9 @@ class MarginMonitor:
             margins=dict(zip(WATCHED, margins[0].tolist(), strict=True)),
             levels={name: LEVEL_NAMES[int(level)] for name, level in zip(WATCHED, levels[0], strict=True)},
             normalized_distance=float(
-                monitor_kernels.normalized_distance(self.tables, sensors.airspeed, sensors.nacelle_angle)
+                monitor_kernels.normalized_distance(
+                    self.tables, sensors.airspeed, sensors.nacelle_angle, turn_excess(sensors.bank)
+                )
             ),
             time_to_limit=ahead,
             side="low" if side < 0.0 else "high" if side > 0.0 else "",
@@ -192,9 +195,7 @@ class MarginMonitor:
             rows: Frame history (frames, SIGNAL_COUNT) from frame 0 on.
         """
         sensors = sensors_of_rows(rows)
-        acting = np.column_stack(
-            [rows[:, COLUMN.stick], rows[:, COLUMN.lever], rows[:, COLUMN.nacelle_command_rate_deg_s] * DEGREE]
-        )
+        acting = rows[:, _ACTED] * UNIT_SCALES[_ACTED]
         frames = len(rows)
         ahead, side, distance = np.zeros(frames), np.zeros(frames), np.zeros(frames)
         monitor_kernels.predict(self._law, sensors, acting, ahead, side)
@@ -223,6 +224,8 @@ def monitor_tables(boundary: str, database: Database) -> MonitorTables:
         torque=limits.torque,
         sink=limits.sink,
         rotor=limits.rotor,
+        sideways=limits.sideways,
+        alpha_speed=limits.alpha_speed,
         numbers=np.array([getattr(limits, name) for name in LIMIT.asdict()]),
         threshold=levels.threshold,
         hysteresis=levels.hysteresis,

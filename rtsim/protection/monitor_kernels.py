@@ -9,14 +9,29 @@ import numpy as np
 
 from rtsim.arrays import FloatArray, IntArray
 from rtsim.command import SENSOR
-from rtsim.corridor.corridor_kernels import CorridorTables
+from rtsim.corridor.corridor_kernels import CorridorTables, boundary_speed, turn_excess
 from rtsim.frame import COLUMN, NACELLES_JAMMED
 from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.places import Places
-from rtsim.protection.law_data import LAW, LAW_MONITOR, WORK_SIZE, ProtectionTables, SinkTables, TorqueTables
+from rtsim.protection.law_data import (
+    LAW,
+    LAW_MONITOR,
+    WORK_SIZE,
+    ProtectionTables,
+    SidewaysLimits,
+    SinkTables,
+    TorqueTables,
+)
 from rtsim.protection.law_kernels import law_start, protect
 from rtsim.protection.limiter_kernels import allowed_sink, torque_limit
 from rtsim.protection.prediction_kernels import BoundaryTables, speed_range
+from rtsim.protection.sideways_limiter_kernels import (
+    bank_limit,
+    sideward_limit,
+    sideward_speed,
+    worst_flapping,
+    worst_torque,
+)
 from rtsim.units import DEGREE, KNOT
 
 LIMIT_WORDS = {
@@ -34,6 +49,8 @@ LIMIT_WORDS = {
     "engine_power": "engine power",
     "transmission": "helicopter transmission",
     "rotor_endurance": "rotor endurance",
+    "bank_attitude": "bank attitude",
+    "sideslip": "sideslip",
     "time_to_limit": "time to the corridor's boundary",
 }
 """Limits in words for people, in the order of the recorded reasons (a reason is a limit's place plus one), and last the
@@ -90,6 +107,10 @@ class MonitorTables(NamedTuple):
     """Sink rate."""
     rotor: RotorTables
     """Transmission and rotor endurance."""
+    sideways: SidewaysLimits
+    """Bank and sideslip."""
+    alpha_speed: float
+    """Added to the airspeed where sideslip is an angle [m/s]."""
     numbers: FloatArray
     """Limits that are numbers, places ``LIMIT``."""
     threshold: FloatArray
@@ -157,22 +178,26 @@ def limit_margins(
             and rotor load.
     """
     airspeed, angle, numbers = sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle], tables.numbers
-    low, high = speed_range(tables.chart, angle)
+    excess = turn_excess(sensors[SENSOR.bank])
+    low, high = speed_range(tables.chart, angle, excess)
     out[KIND.stall_attitude] = airspeed - low
     out[KIND.load_torque] = high - airspeed
     # On the downstop the gate is closed, margin negative, while leaving it would be over the limit off it.
     out[KIND.downstop_gate] = tables.chart.high[0] - airspeed if sensors[SENSOR.on_downstop] != 0.0 else FAR
     out[KIND.nacelle_range] = min(angle - numbers[LIMIT.nacelle_forward], numbers[LIMIT.nacelle_aft] - angle)
     out[KIND.nacelle_rate] = numbers[LIMIT.nacelle_rate] - abs(sensors[SENSOR.nacelle_rate])
-    out[KIND.flap_stop] = numbers[LIMIT.flapping] - abs(sensors[SENSOR.flapping])
-    out[KIND.mast_torque] = 1.0 - sensors[SENSOR.mast_torque] / torque_limit(tables.torque, airspeed, angle)
+    out[KIND.flap_stop] = numbers[LIMIT.flapping] - worst_flapping(sensors)
+    out[KIND.mast_torque] = 1.0 - worst_torque(sensors) / torque_limit(tables.torque, airspeed, angle)
     nz = sensors[SENSOR.load_factor]
     out[KIND.load_factor] = min(numbers[LIMIT.load_factor_max] - nz, nz - numbers[LIMIT.load_factor_min])
     out[KIND.pitch_attitude] = numbers[LIMIT.pitch] - abs(sensors[SENSOR.pitch])
-    low, high = speed_range(tables.plant, angle)
+    low, high = speed_range(tables.plant, angle, excess)
     out[KIND.consistency] = min(airspeed - low, high - airspeed)
     out[KIND.sink] = allowed_sink(tables.sink, airspeed, sensors[SENSOR.altitude]) + sensors[SENSOR.climb_rate]
     _rotor_margins(tables.rotor, driven, angle, out)
+    out[KIND.bank_attitude] = min(bank_limit(tables.sideways, angle) - abs(sensors[SENSOR.bank]), FAR)
+    sideward = sideward_speed(sensors, tables.alpha_speed)
+    out[KIND.sideslip] = min(sideward_limit(tables.sideways, airspeed) - abs(sideward), FAR)
     out[KIND.time_to_limit] = time_to_limit
 
 
@@ -216,13 +241,14 @@ def _segment_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: f
 
 
 @inner_kernel
-def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) -> float:
+def normalized_distance(tables: MonitorTables, airspeed: float, angle: float, excess: float) -> float:
     """Signed distance to the nearer boundary in the plane of airspeed / 10 kn and nacelle angle / 10 deg.
 
     For displays and ranking; laws use the speed margins.
 
     Args:
         angle: Nacelle angle [rad].
+        excess: Load factor of the turn less 1, which moves the sides.
 
     Returns:
         The distance [-], positive inside.
@@ -232,11 +258,14 @@ def normalized_distance(tables: MonitorTables, airspeed: float, angle: float) ->
     for side in range(2):
         nacelle = tables.corners.low_nacelle if side == 0 else tables.corners.high_nacelle
         speed = tables.corners.low_speed if side == 0 else tables.corners.high_speed
+        turned = tables.corners.turn_low if side == 0 else tables.corners.turn_high
         for i in range(nacelle.shape[0] - 1):
-            x0, y0 = speed[i] / (10.0 * KNOT), nacelle[i] / (10.0 * DEGREE)
-            x1, y1 = speed[i + 1] / (10.0 * KNOT), nacelle[i + 1] / (10.0 * DEGREE)
+            first = speed[i] + excess * boundary_speed(tables.corners.turn_nacelle, turned, nacelle[i])
+            second = speed[i + 1] + excess * boundary_speed(tables.corners.turn_nacelle, turned, nacelle[i + 1])
+            x0, y0 = first / (10.0 * KNOT), nacelle[i] / (10.0 * DEGREE)
+            x1, y1 = second / (10.0 * KNOT), nacelle[i + 1] / (10.0 * DEGREE)
             best = min(best, _segment_distance(x, y, x0, y0, x1, y1))
-    low, high = speed_range(tables.chart, angle)
+    low, high = speed_range(tables.chart, angle, excess)
     if angle <= tables.chart.downstop_nacelle and airspeed > tables.corners.high_speed[0]:
         # On the downstop the flap-extended limit is no boundary; the end of the downstop's own range is.
         best = abs(high - airspeed) / (10.0 * KNOT)
@@ -294,7 +323,9 @@ def distances(tables: MonitorTables, sensors: FloatArray, distance: FloatArray) 
         distance: Written (frames,).
     """
     for k in range(sensors.shape[0]):
-        distance[k] = normalized_distance(tables, sensors[k, SENSOR.airspeed], sensors[k, SENSOR.nacelle_angle])
+        excess = turn_excess(sensors[k, SENSOR.bank])
+        airspeed, angle = sensors[k, SENSOR.airspeed], sensors[k, SENSOR.nacelle_angle]
+        distance[k] = normalized_distance(tables, airspeed, angle, excess)
 
 
 @kernel
@@ -306,16 +337,23 @@ def predict(
     Args:
         tables: A law's tables; whatever the law, nothing is limited here.
         sensors: One row per frame, shape (frames, SENSOR.size).
-        acting: Stick, lever, nacelle rate [rad/s] that acted (frames, 3).
+        acting: Stick, lever, nacelle rate [rad/s], lateral stick, pedals that acted (frames, 5).
         time_to_limit: Written (frames,) [s].
         side: Written: -1 low, 1 high, 0 none within the horizon (frames,).
     """
     watching = ProtectionTables(
-        LAW_MONITOR, tables.every, tables.model, tables.corridor, tables.torque, tables.sink, tables.settings
+        LAW_MONITOR,
+        tables.every,
+        tables.model,
+        tables.corridor,
+        tables.torque,
+        tables.sink,
+        tables.sideways,
+        tables.settings,
     )
     state = np.empty(LAW.size)
     law_start(watching, state)
-    work, applied = np.empty(WORK_SIZE), np.empty(3)
+    work, applied = np.empty(WORK_SIZE), np.empty(acting.shape[1])
     for k in range(sensors.shape[0]):
         protect(watching, state, k, sensors[k], acting[k], applied, work)
         time_to_limit[k], side[k] = state[LAW.time], state[LAW.side]

@@ -4,7 +4,8 @@ The model is the rigid body (u, w, q, pitch) with the rotor and the actuators se
 trim of the present airspeed and nacelle angle, and exact gravity and Coriolis terms; the nacelles follow their filter
 exactly. What the model's acceleration misses now is carried along and dies away.
 
-Legend: z = (u, w, q, pitch); c = (stick, lever); V horizontal airspeed; n nacelle angle; r nacelle command rate.
+Legend: z = (u, w, q, pitch); c = (stick, lever); V horizontal airspeed; n nacelle angle; r nacelle command rate. In a
+turn q is the pitch rate less what the turn itself needs (``turn_model``).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import math
 from typing import NamedTuple
 
 from rtsim.arrays import FloatArray
+from rtsim.command import SENSOR
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import bilinear
 from rtsim.places import Places
@@ -29,8 +31,17 @@ CELL = Places(
     ("flap_c", 7),  # the same of the cosine flapping
     ("flap_s", 7),  # the same of the sine flapping
     ("gain", 8),  # regulator of the recovery: stick and lever per deviation of u, w, q, pitch (2 x 4)
+    ("turn", 9),  # what each unit of load factor above 1 adds to trim, controls, torque, cosine and sine flapping
+    ("side", 5),  # derivatives of the sideward acceleration with v, p, r, lateral stick, pedals
+    ("roll", 5),  # the same of the rolling acceleration
+    ("yaw", 5),  # the same of the yawing acceleration
+    "load",  # load factor of the turn that the model is for: 1 until ``turn_model`` sets it
+    "excess",  # load factor less 1 of the turn that the corridor is watched for
 )
 """Places in one cell of ``ModelTables.cells``."""
+
+_NO_DIRECTION = 5.0
+"""Speed below which the flight has hardly a direction [m/s]."""
 
 OUT = Places(
     "low",  # least margins to the low and the high side [m/s]
@@ -58,6 +69,10 @@ class ModelTables(NamedTuple):
     """Smallest nacelle command angle [rad]."""
     aft_stop: float
     """Largest nacelle command angle [rad]."""
+    alpha_speed: float
+    """Added to the airspeed where sideslip is an angle, as for scheduling [m/s]."""
+    turns: int
+    """1: the aircraft moves out of its plane of symmetry too."""
 
 
 class BoundaryTables(NamedTuple):
@@ -73,32 +88,88 @@ class BoundaryTables(NamedTuple):
     """At and below this angle the nacelles rest on the downstop [rad]."""
     downstop_speed: float
     """High-speed side on the downstop [m/s]."""
+    turn_low: FloatArray
+    """What the low-speed side gains for each unit of load factor above 1, shape (n,) [m/s]."""
+    turn_high: FloatArray
+    """The same of the high-speed side off the downstop, negative or 0, shape (n,) [m/s]."""
 
 
 @inner_kernel
-def speed_range(tables: BoundaryTables, angle: float) -> tuple[float, float]:
+def speed_range(tables: BoundaryTables, angle: float, excess: float) -> tuple[float, float]:
     """Lowest and highest allowed airspeed at a nacelle angle [m/s].
 
     Args:
         angle: Nacelle angle [rad].
+        excess: Load factor of the turn less 1.
     """
     place = min(max(angle / tables.spacing, 0.0), tables.low.shape[0] - 1.000001)
     k = int(place)
     share = place - k
     low = tables.low[k] + share * (tables.low[k + 1] - tables.low[k])
-    if angle <= tables.downstop_nacelle:
-        return low, tables.downstop_speed
-    return low, tables.high[k] + share * (tables.high[k + 1] - tables.high[k])
+    high = tables.high[k] + share * (tables.high[k + 1] - tables.high[k])
+    if excess != 0.0:
+        low += excess * tables.turn_low[k]
+        high += excess * tables.turn_high[k]
+    return low, tables.downstop_speed if angle <= tables.downstop_nacelle else high
 
 
 @inner_kernel
 def model_at(tables: ModelTables, airspeed: float, nacelle: float, out: FloatArray) -> None:
-    """Interpolate the model, bilinear; outside the grid the nearest point holds.
+    """Interpolate the model of straight flight, bilinear; outside the grid the nearest point holds.
 
     Args:
         out: Written: one cell, shape (CELL_SIZE,).
     """
-    bilinear(tables, tables.cells, airspeed, nacelle, CELL.size, out)
+    bilinear(tables, tables.cells, airspeed, nacelle, CELL.load, out)
+    out[CELL.load], out[CELL.excess] = 1.0, 0.0
+
+
+@inner_kernel
+def turn_model(cell: FloatArray, load: float, excess: float) -> None:
+    """Make a model that of a turn: trim, controls, torque and flapping are those of the load it carries.
+
+    In its own plane of symmetry the turning aircraft flies straight, and weighs more by the load factor; pitch is its
+    angle of attack and the climb above, and the pitch rate that the turn itself needs takes no part (``turn_motion``).
+
+    Args:
+        cell: The model of level flight; changed in place.
+        load: Load factor of the turn now.
+        excess: Load factor less 1 for which the corridor is watched: of the turn that is begun.
+    """
+    cell[CELL.load], cell[CELL.excess] = load, excess
+    more = load - 1.0
+    before = cell[CELL.state + 3]
+    for k in range(4):
+        cell[CELL.state + k] += more * cell[CELL.turn + k]
+    cell[CELL.control] += more * cell[CELL.turn + 4]
+    cell[CELL.control + 1] += more * cell[CELL.turn + 5]
+    cell[CELL.torque] += more * cell[CELL.turn + 6]
+    cell[CELL.flap_c] += more * cell[CELL.turn + 7]
+    cell[CELL.flap_s] += more * cell[CELL.turn + 8]
+    pitch = cell[CELL.state + 3]
+    cell[CELL.air] += GRAVITY * (load * math.sin(pitch) - math.sin(before))
+    cell[CELL.air + 1] -= GRAVITY * (load * math.cos(pitch) - math.cos(before))
+
+
+@inner_kernel
+def turn_motion(sensors: FloatArray) -> tuple[float, float, float, float]:
+    """What a turning aircraft does in its own plane of symmetry, as if it flew straight there: u, w, q, pitch.
+
+    Args:
+        sensors: What is known, order of ``rtsim.command.Sensors``.
+    """
+    airspeed, pitch, climb = sensors[SENSOR.airspeed], sensors[SENSOR.pitch], sensors[SENSOR.climb_rate]
+    sine, cosine, bank = math.sin(pitch), math.cos(pitch), sensors[SENSOR.bank]
+    upright = max(math.cos(bank), 0.5)
+    u, w = airspeed * cosine + climb * sine, (airspeed * sine - climb * cosine) / upright
+    q = sensors[SENSOR.pitch_rate] - sensors[SENSOR.yaw_rate] * math.sin(bank) / upright
+    square = u * u + w * w
+    ahead = math.sqrt(max(square - climb * climb, 0.0))
+    if airspeed < 0.0:
+        ahead = -ahead
+    # The angle that turns (u, w) into what flies ahead and what climbs; in hover there is none, and attitude stands.
+    whole = math.atan2(u * climb + w * ahead, u * ahead - w * climb)
+    return u, w, q, pitch + square / (square + _NO_DIRECTION**2) * (whole - pitch)
 
 
 @inner_kernel
@@ -156,12 +227,12 @@ def accelerations(
         cell[CELL.air + 2] + cell[CELL.a + 6] * du + cell[CELL.a + 7] * dw + cell[CELL.a + 8] * dq
         + cell[CELL.b + 6] * ds + cell[CELL.b + 7] * dl + cell[CELL.b + 8] * rate + cell[CELL.nacelle + 2] * dn
     )  # fmt: skip
-    sine, cosine = math.sin(pitch), math.cos(pitch)
+    sine, cosine, weight = math.sin(pitch), math.cos(pitch), GRAVITY * cell[CELL.load]
     # The Coriolis terms turn the velocity with the body and leave the horizontal airspeed alone.
     airspeed_rate = a * cosine + b * sine
     return (
-        a - GRAVITY * sine - q * w,
-        b + GRAVITY * cosine + q * u,
+        a - weight * sine - q * w,
+        b + weight * cosine + q * u,
         m,
         airspeed_rate,
         u * cosine + w * sine,
@@ -216,7 +287,7 @@ def roll_out(
     for k in range(int(horizon / step + 0.5) + 1):
         a, b, m, _, airspeed = accelerations(cell, (u, w, q, pitch), controls, (angle - here, rate))
         airspeed += carried
-        slowest, fastest = speed_range(corridor, angle)
+        slowest, fastest = speed_range(corridor, angle, cell[CELL.excess])
         low, high = airspeed - slowest, fastest - airspeed
         margin = min(low, high)
         out[OUT.low] = min(out[OUT.low], low)

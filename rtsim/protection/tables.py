@@ -56,6 +56,7 @@ def law_tables(
         corridor=sample_boundary(corridor),
         torque=limits.torque,
         sink=limits.sink,
+        sideways=limits.sideways,
         settings=load_settings(profile, dt=dt) if settings is None else settings,
     )
 
@@ -76,6 +77,8 @@ def sample_boundary(corridor: Corridor) -> BoundaryTables:
         high=high,
         downstop_nacelle=corridor.downstop_nacelle,
         downstop_speed=corridor.downstop_speed,
+        turn_low=np.interp(angles, corridor.turning.nacelle, corridor.turning.low),
+        turn_high=np.interp(angles, corridor.turning.nacelle, corridor.turning.high),
     )
 
 

@@ -18,11 +18,11 @@ from rtsim.loop.option_tables import given
 from rtsim.loop.options import FlightOptions
 from rtsim.loop.script import Pulse
 from rtsim.loop.setup import FlightSetup
-from rtsim.programme import AIRSPEED_RANGE, Programme, ProgrammePoint
+from rtsim.programme import AIRSPEED_RANGE, LARGEST_BANK, LARGEST_TURN_RATE, TURN, Programme, ProgrammePoint
 from rtsim.protection.boundary import load_boundary
 from rtsim.random_streams import STREAM_CAMPAIGN, stream_generator
 from rtsim.units import deg, kt
-from scenarios.campaign.spec import CLASS_OPTIONS, CampaignFile, ClassTable, Generator, PulseDraw, draw
+from scenarios.campaign.spec import CLASS_OPTIONS, CampaignFile, ClassTable, Generator, PulseDraw, draw, fault_of
 from scenarios.campaign.trial import FlightPlan, has_trim
 from scenarios.files.loader import load_scenario
 
@@ -119,7 +119,7 @@ def _has_trim(airspeed: float, angle: float, aircraft: AircraftName) -> bool:
 
 
 def _programme(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> Programme:
-    """Ramps of airspeed and nacelle angle from the start."""
+    """Ramps of airspeed, nacelle angle and turn from the start."""
     ramps: list[tuple[float, float, float, float]] = []  # begin, end, from, to of airspeed, then of the nacelle
     if item.speed is not None:
         begin = max(draw(item.speed.begin_s, generator), 0.0)
@@ -135,11 +135,31 @@ def _programme(item: ClassTable, start: ProgrammePoint, corridor: Corridor, gene
         ramps.append((begin, begin + abs(goal - start.nacelle_angle) / deg(rate), start.nacelle_angle, goal))
     else:
         ramps.append((0.0, 0.0, start.nacelle_angle, start.nacelle_angle))
+    kind, turning = _turn(item, generator)
+    ramps.append(turning)
     times = np.unique([0.0, *(time for ramp in ramps for time in ramp[:2])])
     values = [
         np.interp(times, ramp[:2], ramp[2:]) if ramp[1] > ramp[0] else np.full(times.shape, ramp[3]) for ramp in ramps
     ]
-    return Programme(times, values[0], values[1], np.full(times.shape, start.altitude))
+    turns = np.full(times.shape, float(kind))
+    return Programme(times, values[0], values[1], np.full(times.shape, start.altitude), turns, values[2])
+
+
+def _turn(item: ClassTable, generator: Generator) -> tuple[int, tuple[float, float, float, float]]:
+    """What turning is asked for, one of ``TURN``, and when: begin, end, from, to."""
+    table = item.turn
+    if table is None:
+        return TURN.bank, (0.0, 0.0, 0.0, 0.0)
+    begin, rolls = max(draw(table.begin_s, generator), 0.0), max(draw(table.roll_s, generator), 0.1)
+    by_bank = table.bank_deg is not None
+    wanted = table.bank_deg if table.bank_deg is not None else table.turn_rate_deg_s
+    assert wanted is not None  # the file was checked
+    goal = deg(draw(wanted, generator))
+    largest = LARGEST_BANK if by_bank else LARGEST_TURN_RATE
+    goal = float(np.clip(goal, -largest, largest))
+    if table.either_sign and generator.random() < 0.5:
+        goal = -goal
+    return (TURN.bank if by_bank else TURN.rate), (begin, begin + rolls, 0.0, goal)
 
 
 def _target(item: ClassTable, start: ProgrammePoint, corridor: Corridor, generator: Generator) -> float:
@@ -184,10 +204,15 @@ def _pulses(table: PulseDraw, generator: Generator) -> list[Pulse]:
 def _faults(item: ClassTable, generator: Generator) -> list[Fault]:
     found = []
     for table in item.faults:
-        start = max(draw(table.time_s, generator), 0.0)
-        end = None if table.duration_s is None else start + max(draw(table.duration_s, generator), 0.01)
-        bias = None if table.bias_kt is None else kt(draw(table.bias_kt, generator))
-        found.append(Fault(kind=table.kind, start=start, end=end, bias=bias))
+        begins = max(draw(table.time_s, generator), 0.0)
+        found.append(
+            fault_of(
+                table,
+                lambda number: draw(number, generator),
+                lambda listed: listed[int(generator.integers(len(listed)))],
+                begins,
+            )
+        )
     return found
 
 

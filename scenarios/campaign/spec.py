@@ -5,6 +5,7 @@ Every number has its unit in its key. A number may be a constant or a distributi
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,12 +14,15 @@ from pydantic import BaseModel, Field, create_model
 
 from rtsim.choices import CorridorName
 from rtsim.errors import InputError
+from rtsim.faults.fault import Actuator, Control, Fault, FaultKind, Stop
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
 from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
+from scenarios.files.disturbances import FAULT_KEYS, faults_of
 from scenarios.files.expectation import name_problems
+from scenarios.files.schema import FaultTable
 from scenarios.files.trial import LARGEST_PULSES
 
 Generator = np.random.Generator
@@ -45,7 +49,11 @@ RANGES: dict[str, tuple[float, float]] = {
     "period_s": (0.05, 600.0),
     "count": (0.0, 1000.0),
     "reaction_s": (0.0, 3600.0),
+    "roll_s": (0.1, 60.0),
+    "bank_deg": (-60.0, 60.0),
+    "turn_rate_deg_s": (-30.0, 30.0),
     "bias_kt": (-100.0, 100.0),
+    "power_shp": (0.0, 1802.0),
     "turbulence_kt": (0.0, 100.0),
     "ahead_kt": (-200.0, 200.0),
     "below_kt": (-200.0, 200.0),
@@ -120,13 +128,28 @@ class PulseDraw(Strict):
     replaces: bool = False
 
 
-class FaultDraw(Strict):
-    """One of ``faults``."""
+class TurnDraw(Strict):
+    """``turn``: the turn the programme asks for, and keeps asking for."""
 
-    kind: Literal["nacelle-jammed", "airspeed-bias", "airspeed-frozen"]
+    begin_s: Number = 2.0
+    roll_s: Number = 2.0
+    bank_deg: Number | None = None
+    turn_rate_deg_s: Number | None = None
+    either_sign: bool = False
+
+
+class FaultDraw(Strict):
+    """One of ``faults``: the keys of a scenario's, numbers drawn, and one of what is listed."""
+
+    kind: FaultKind
     time_s: Number
     duration_s: Number | None = None
     bias_kt: Number | None = None
+    rate_deg_s: Number | None = None
+    power_shp: Number | None = None
+    actuator: Actuator | list[Actuator] | None = None
+    control: Control | list[Control] | None = None
+    stop: Stop | list[Stop] | None = None
 
 
 class GustDraw(Strict):
@@ -166,6 +189,7 @@ class ClassTable(_ClassOptions, Strict):  # type: ignore[misc]  # made from the 
     start: StartDraw | None = None
     speed: SpeedDraw | None = None
     nacelle: NacelleDraw | None = None
+    turn: TurnDraw | None = None
     pulses: list[PulseDraw] = []
     faults: list[FaultDraw] = []
     gusts: list[GustDraw] = []
@@ -308,7 +332,7 @@ def _expectation_contradictions(spec: CampaignFile, file: str) -> list[InputErro
 def _odd(item: ClassTable) -> list[tuple[str, str, str]]:
     """What does not go together in a class: key, problem, mend."""
     found = []
-    if item.scenarios and (item.start or item.speed or item.nacelle):
+    if item.scenarios and (item.start or item.speed or item.nacelle or item.turn):
         found.append(("", "has scenarios and a start of its own", "keep either"))
     if not item.scenarios and item.start is None:
         found.append((".start", "is missing", "say where flights begin, or give scenarios"))
@@ -318,10 +342,41 @@ def _odd(item: ClassTable) -> list[tuple[str, str, str]]:
         targets = (item.speed.target_kt, item.speed.beyond_high_kt, item.speed.beyond_low_kt)
         if sum(target is not None for target in targets) != 1:
             found.append((".speed", "needs one of target_kt, beyond_high_kt and beyond_low_kt", "give one of them"))
+    if item.turn is not None and (item.turn.bank_deg is None) == (item.turn.turn_rate_deg_s is None):
+        found.append((".turn", "needs either bank_deg or turn_rate_deg_s", "give one of them"))
     for number, fault in enumerate(item.faults):
-        if (fault.bias_kt is None) == (fault.kind == "airspeed-bias"):
-            found.append((f".faults[{number}].bias_kt", "belongs to airspeed-bias, and only there", "correct it"))
+        try:
+            fault_of(fault, lambda number: _extremes(number)[0], lambda listed: listed[0])
+        except InputError as error:
+            key = FAULT_KEYS.get(error.key or "", error.key)
+            found.append((f".faults[{number}].{key}", error.problem, error.mend or "correct it"))
     return found
+
+
+def fault_of(
+    table: FaultDraw, number: Callable[[Number], float], one: Callable[[Sequence[Any]], Any], begins: float = 0.0
+) -> Fault:
+    """Make a failure of a class.
+
+    Args:
+        table: What the class says.
+        number: Draws a number.
+        one: Chooses one of what is listed.
+        begins: When [s].
+
+    Raises:
+        InputError: The kind of failure lacks a key, or has one too many.
+    """
+    duration = None if table.duration_s is None else max(number(table.duration_s), 0.01)
+    keys: dict[str, Any] = {"kind": table.kind, "time_s": begins}
+    keys["end_s"] = None if duration is None else begins + duration
+    for name in ("bias_kt", "rate_deg_s", "power_shp"):
+        value = getattr(table, name)
+        keys[name] = None if value is None else number(value)
+    for name in ("actuator", "control", "stop"):
+        value = getattr(table, name)
+        keys[name] = one(value) if isinstance(value, list) else value
+    return faults_of([FaultTable(**keys)])[0]
 
 
 def _number_problems(
@@ -348,8 +403,10 @@ def _number_problems(
     return found
 
 
-def _extremes(number: Uniform | Normal | Choice) -> list[float]:
+def _extremes(number: Number) -> list[float]:
     """What is certain to be drawn or nearly; the tails of a normal distribution are not."""
+    if isinstance(number, float | int):
+        return [float(number)]
     if isinstance(number, Uniform):
         return number.uniform
     return number.normal[:1] if isinstance(number, Normal) else number.choice

@@ -15,7 +15,7 @@ from scenarios.files.schema import AirGustTable, AirTable, FaultTable
 if TYPE_CHECKING:
     from rtsim.loop.simulation import Disturbance
 
-_FAULT_KEYS = {"rate": "rate_deg_s", "bias": "bias_kt", "power": "power_shp", "end": "end_s", "start": "time_s"}
+FAULT_KEYS = {"rate": "rate_deg_s", "bias": "bias_kt", "power": "power_shp", "end": "end_s", "start": "time_s"}
 """Keys of a scenario file for the fields of a failure that differ from them."""
 _GUST_KEYS = {"duration": "duration_s", "length": "length_m", "start": "time_s"}
 DISTURBANCE_KINDS = ("gust", "turbulence", "failure")
@@ -39,7 +39,7 @@ def disturbance_problems(air: AirTable, faults: Sequence[FaultTable], file: str)
     for number, gust in enumerate(air.gusts):
         found += _made(lambda gust=gust: _gust(gust), file, f"air.gusts[{number}]", _GUST_KEYS)
     for number, fault in enumerate(faults):
-        found += _made(lambda fault=fault: _fault(fault), file, f"faults[{number}]", _FAULT_KEYS)
+        found += _made(lambda fault=fault: _fault(fault), file, f"faults[{number}]", FAULT_KEYS)
     return found
 
 
