@@ -61,6 +61,7 @@ LAW = Places(
     "roll_bias",
     "last_yaw_rate",
     "yaw_bias",
+    "even_lever",  # lever when the aircraft last rolled as the model does
     "recover_side",
     "override",  # 1: the pilot has switched the law's authority off
     "shift",  # place on the database's nacelle axis less the nacelle angle: below 0 while the rotors are slow [rad]
@@ -162,6 +163,12 @@ class LawSettings(NamedTuple):
     """Full: how sharply sideslip may approach it [rad/s]."""
     drift_time: float
     """Full: time in which sideward flight may come to its limit [s]."""
+    even_roll: float
+    """Full: missed rolling acceleration up to which both sides are taken to act alike [rad/s^2]."""
+    uneven_roll: float
+    """Full: missed rolling acceleration from which the lever goes back to where they did [rad/s^2]."""
+    uneven_lever: float
+    """Full: how far the lever may be from there."""
     roll_filter: float
     """Full: time constant with which the rolling and yawing that the model misses are learned [s]."""
 

@@ -251,6 +251,9 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
         sideslip_buffer=kt(turn.number("sideward_buffer_kt", low=0.0, high=50.0)),
         sideslip_frequency=turn.number("sideslip_frequency_rad_s", low=0.01, high=20.0),
         drift_time=turn.number("drift_time_s", low=0.1, high=60.0),
+        even_roll=turn.number("even_roll_rad_s2", low=0.0, high=100.0),
+        uneven_roll=turn.number("uneven_roll_rad_s2", low=0.0, high=100.0),
+        uneven_lever=turn.number("uneven_lever", low=0.0, high=1.0),
         roll_filter=turn.number("roll_filter_s", low=0.01, high=60.0),
     )
 

@@ -138,6 +138,24 @@ def turn_allowed(tables: ProtectionTables, sensors: FloatArray) -> tuple[float, 
 
 
 @inner_kernel
+def _hold_lever(tables: ProtectionTables, state: FloatArray) -> None:
+    """Where one side does not answer, keep the lever near where both last did.
+
+    There the torque's bound may take it to the lower end of what is left, no further: the mast of the side that does
+    not answer would have it down to its stop, and the aircraft over.
+    """
+    settings, missed = tables.settings, abs(state[LAW.roll_bias])
+    if missed < settings.even_roll or state[LAW.started] == 0.0:
+        state[LAW.even_lever] = state[LAW.acted_lever]
+    elif missed > settings.uneven_roll:
+        least = max(state[LAW.even_lever] - settings.uneven_lever, 0.0)
+        most = min(state[LAW.even_lever] + settings.uneven_lever, 1.0)
+        if not least < state[LAW.lever_high] < most:
+            state[LAW.lever_reason] = REASON_BANK
+        state[LAW.lever_low], state[LAW.lever_high] = least, min(max(state[LAW.lever_high], least), most)
+
+
+@inner_kernel
 def limit_sideways(tables: ProtectionTables, state: FloatArray, cell: FloatArray, sensors: FloatArray) -> None:
     """Bound the lateral stick so that bank stays inside, and the pedals so that sideslip does.
 
@@ -164,6 +182,8 @@ def limit_sideways(tables: ProtectionTables, state: FloatArray, cell: FloatArray
     state[LAW.yaw_bias] += share * (missed - state[LAW.yaw_bias])
     rolled += state[LAW.roll_bias]
     yawed += state[LAW.yaw_bias]
+
+    _hold_lever(tables, state)
 
     allowed, reason = turn_allowed(tables, sensors)
     right, left, right_reason, left_reason = allowed, allowed, reason, reason
