@@ -61,6 +61,7 @@ LAW = Places(
     "roll_bias",
     "last_yaw_rate",
     "yaw_bias",
+    "differential_collective",  # lateral stick as the collectives follow it
     "even_lever",  # lever when the aircraft last rolled as the model does
     "recover_side",
     "override",  # 1: the pilot has switched the law's authority off
@@ -169,6 +170,8 @@ class LawSettings(NamedTuple):
     """Full: missed rolling acceleration from which the lever goes back to where they did [rad/s^2]."""
     uneven_lever: float
     """Full: how far the lever may be from there."""
+    differential_lag: float
+    """Full: time constant of the differential collective [s]."""
     roll_filter: float
     """Full: time constant with which the rolling and yawing that the model misses are learned [s]."""
 

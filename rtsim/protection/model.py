@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_STATES, position, required_position
+from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_OUTPUTS, LATERAL_STATES, position, required_position
 from rtsim.arrays import FloatArray
 from rtsim.lpv.database import Database
 from rtsim.lpv.lateral import LateralData
@@ -101,7 +101,7 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
     cells[..., kernels.CELL.load] = 1.0
     if database.lateral is not None:
         data = LateralData.of(database)
-        lateral = _lateral_rows(data)
+        lateral = _lateral_rows(data)  # of side, roll, yaw, twist
         cells[..., kernels.CELL.side : kernels.CELL.side + lateral.shape[-1]] = lateral
         flapping = [required_position(database.states, name, "protection") for name in ("flap_1c", "flap_1s")]
         loaded = np.concatenate(
@@ -131,12 +131,21 @@ def reduce_model(database: Database, weights: RegulatorWeights) -> ModelTables:
 
 
 def _lateral_rows(data: LateralData) -> FloatArray:
-    """Sideward, rolling and yawing acceleration per v, p, r, lateral stick and pedals, in level flight [V, N, 15]."""
+    """What v, p, r, lateral stick and pedals do in level flight [V, N, 20].
+
+    Rows: sideward, rolling and yawing acceleration, and the difference of the masts' torques.
+    """
     kept = [position(LATERAL_STATES, name) for name in _SIDEWAYS]
     inputs = [position(LATERAL_INPUTS, name) for name in _LATERAL_CONTROLS]
     a, b = eliminated(data.A[0], data.B[0], kept, inputs)
-    rows = np.concatenate([a[..., :3, :3], b[..., :3, :]], axis=-1)
-    return np.asarray(rows.reshape(*rows.shape[:2], 15))
+    fast = [place for place in range(len(LATERAL_STATES)) if place not in kept]
+    quick = data.A[0][..., fast, :]
+    push = np.concatenate([quick[..., kept[:3]], data.B[0][..., fast, :][..., inputs]], axis=-1)
+    twist = position(LATERAL_OUTPUTS, "torque_difference")
+    direct = np.concatenate([data.C[0][..., twist, kept[:3]], data.D[0][..., twist, inputs]], axis=-1)
+    torque = direct + np.einsum("...f,...fk->...k", data.C[0][..., twist, fast], settle(quick[..., fast], push))
+    rows = np.concatenate([np.concatenate([a[..., :3, :3], b[..., :3, :]], axis=-1), torque[..., None, :]], axis=-2)
+    return np.asarray(rows.reshape(*rows.shape[:2], 20))
 
 
 def regulator_gains(a: FloatArray, b: FloatArray, z: FloatArray, weights: RegulatorWeights) -> FloatArray:

@@ -35,6 +35,7 @@ CELL = Places(
     ("side", 5),  # derivatives of the sideward acceleration with v, p, r, lateral stick, pedals
     ("roll", 5),  # the same of the rolling acceleration
     ("yaw", 5),  # the same of the yawing acceleration
+    ("twist", 5),  # the same of the right mast's torque less that of both in the mean
     "load",  # load factor of the turn that the model is for: 1 until ``turn_model`` sets it
     "excess",  # load factor less 1 of the turn that the corridor is watched for
 )

@@ -19,9 +19,11 @@ from rtsim.protection.law_data import (
     REASON_HIGH,
     REASON_LOW,
     REASON_SIDESLIP,
+    REASON_TORQUE,
     ProtectionTables,
     SidewaysLimits,
 )
+from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.prediction_kernels import speed_range
 from rtsim.units import GRAVITY
 
@@ -156,6 +158,28 @@ def _hold_lever(tables: ProtectionTables, state: FloatArray) -> None:
 
 
 @inner_kernel
+def _bound_twist(tables: ProtectionTables, state: FloatArray, cell: FloatArray, sensors: FloatArray) -> None:
+    """Narrow the lateral stick's bounds so that neither mast passes its torque, as far as the bank's leave room."""
+    settings = tables.settings
+    followed = settings.period / settings.differential_lag
+    state[LAW.differential_collective] += min(followed, 1.0) * (
+        state[LAW.acted_lateral] - state[LAW.differential_collective]
+    )
+    twist = cell[model.CELL.twist + 3]
+    if abs(twist) < 1e3:
+        return
+    limit = torque_limit(tables.torque, sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle])
+    most = settings.torque_share * limit
+    right, left = (most - sensors[SENSOR.mast_torque_right]) / twist, (most - sensors[SENSOR.mast_torque_left]) / twist
+    here, low, high = state[LAW.differential_collective], state[LAW.lateral_low], state[LAW.lateral_high]
+    first, last = (here + right, here - left) if twist < 0.0 else (here - left, here + right)
+    if first > low:
+        state[LAW.lateral_low], state[LAW.lateral_low_reason] = min(first, high), REASON_TORQUE
+    if last < high:
+        state[LAW.lateral_high], state[LAW.lateral_high_reason] = max(last, low), REASON_TORQUE
+
+
+@inner_kernel
 def limit_sideways(tables: ProtectionTables, state: FloatArray, cell: FloatArray, sensors: FloatArray) -> None:
     """Bound the lateral stick so that bank stays inside, and the pedals so that sideslip does.
 
@@ -208,6 +232,7 @@ def limit_sideways(tables: ProtectionTables, state: FloatArray, cell: FloatArray
         low, high = (down - rolled) / power, (up - rolled) / power
         state[LAW.lateral_low], state[LAW.lateral_high] = max(min(low, 1.0), -1.0), max(min(high, 1.0), -1.0)
         state[LAW.lateral_low_reason], state[LAW.lateral_high_reason] = left_reason, right_reason
+        _bound_twist(tables, state, cell, sensors)
 
     u = sensors[SENSOR.airspeed]
     effect = cell[side + 2] * cell[yaw + 4]  # pedals turn the nose, and the turn moves the air to the other side
