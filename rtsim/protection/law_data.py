@@ -170,6 +170,8 @@ class LawSettings(NamedTuple):
     """Full: missed rolling acceleration from which the lever goes back to where they did [rad/s^2]."""
     uneven_lever: float
     """Full: how far the lever may be from there."""
+    twist_share: float
+    """Full: torque of one mast over that of both in the mean that is always left, as a share of the limit."""
     differential_lag: float
     """Full: time constant of the differential collective [s]."""
     roll_filter: float

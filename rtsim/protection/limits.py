@@ -254,6 +254,7 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
         even_roll=turn.number("even_roll_rad_s2", low=0.0, high=100.0),
         uneven_roll=turn.number("uneven_roll_rad_s2", low=0.0, high=100.0),
         uneven_lever=turn.number("uneven_lever", low=0.0, high=1.0),
+        twist_share=turn.number("twist_share", low=0.0, high=1.0),
         differential_lag=turn.number("differential_lag_s", low=0.001, high=10.0),
         roll_filter=turn.number("roll_filter_s", low=0.01, high=60.0),
     )

@@ -169,7 +169,8 @@ def _bound_twist(tables: ProtectionTables, state: FloatArray, cell: FloatArray, 
     if abs(twist) < 1e3:
         return
     limit = torque_limit(tables.torque, sensors[SENSOR.airspeed], sensors[SENSOR.nacelle_angle])
-    most = settings.torque_share * limit
+    # Where both are near the limit the lever is what counts: a little twist stays free, else nothing would roll.
+    most = max(settings.torque_share * limit, sensors[SENSOR.mast_torque] + settings.twist_share * limit)
     right, left = (most - sensors[SENSOR.mast_torque_right]) / twist, (most - sensors[SENSOR.mast_torque_left]) / twist
     here, low, high = state[LAW.differential_collective], state[LAW.lateral_low], state[LAW.lateral_high]
     first, last = (here + right, here - left) if twist < 0.0 else (here - left, here + right)

@@ -31,6 +31,8 @@ LIBRARY = "scenarios/campaign/library"
 """Where the campaigns lie that come with rtsim."""
 
 
+LARGEST_FAULT_RATE_DEG_S = 200.0
+"""Fastest motion that may be left to a failed actuator [deg/s]."""
 LARGEST_SWITCH_DEG_S = 12.0
 """Largest nacelle rate that a switch may ask for [deg/s]."""
 FILE_OPTIONS = tuple(item for item in declared().values() if item.campaign == "file")
@@ -392,6 +394,8 @@ def _number_problems(
         if isinstance(table, PulseDraw) and name == "amount":
             largest = LARGEST_PULSES.get(table.channel, LARGEST_SWITCH_DEG_S)
             allowed = (-largest, largest)
+        if isinstance(table, FaultDraw) and name == "rate_deg_s":
+            allowed = (0.0, LARGEST_FAULT_RATE_DEG_S)
         if isinstance(value, BaseModel):
             found += _number_problems(value, place, file, limits=allowed)
         elif isinstance(value, list):
