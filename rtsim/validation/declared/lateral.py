@@ -35,7 +35,25 @@ _AIRPLANE: dict[str, tuple[str, float, dict[str, Any]]] = {
     "ft20000": ("20000 ft", 20000.0, _CLEAN),
 }
 _IN_HOVER = "hover, flaps 40, 565 rpm, inertia of 1975"
-_REASONS: dict[str, str] = {}
+_STALL = "the retreating blades are close to their stall, where differential collective rolls less; past it no trim"
+_TORQUE = "the ailerons alone meet the figure; roll from the torques of differential collective (0.03 to 0.05) is over"
+_AUGMENTED = (
+    "with like powers the figure is damped about twice as much; unlike its neighbour it does not say that the SCAS is "
+    "off: a roll damper of 0.04 (flaps up) and 0.09 (flaps down) in per deg/s would bring the model there"
+)
+_REASONS = {
+    "roll_power.n90": _STALL,
+    "roll_power.n75": "at 140 kn the rotors take 180 000 in lb a mast, more than they may, and are close to stall",
+    "roll_power.n0": _TORQUE,
+    "yaw_power.n90": "the retreating blades stall before: no trim",
+    "clean_roll_power.ft0": _TORQUE,
+    "clean_roll_power.ft20000": "the figure falls with height far less than the density, as its yaw power does",
+    "bank_after_1s.n90": "the retreating blades stall before: no trim",
+    "bank_after_1s.n75": "as the roll power there",
+    "bank_airplane.clean": _AUGMENTED,
+    "bank_airplane.flaps": _AUGMENTED,
+    "hover.yaw.angle": "more than the source's own acceleration gives in 1 s undamped (3.78 deg)",
+}
 """Likely reasons of misses, by series; found after the bands were."""
 
 
