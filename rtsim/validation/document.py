@@ -44,7 +44,7 @@ def _head(validation: Validation) -> Iterable[Block]:
     counts = validation.counts()
     yield Heading("Validation of the nonlinear XV-15", 1)
     yield Paragraph(
-        "Every number that we found published about the XV-15's longitudinal behaviour, and what the model gives. "
+        "Every number that we found published about the XV-15's behaviour, and what the model gives. "
         "Written by `rtsim validate --out DIR --sensitivity`; nothing here is typed by hand. Nothing is fitted: where "
         "the model misses, the miss is stated. The published numbers stand in `rtsim/validation/data/published.toml`, "
         "under the name given beside each; the checks are declared in `rtsim/validation/declared`. What the model is: "

@@ -309,6 +309,25 @@ def _named(result: Result) -> str:
     return check.quantity if check.id == check.series else f"{check.quantity}, {check.id.rsplit('.', 1)[1].upper()}"
 
 
+def _lateral(validation: Validation, figure: Figure) -> None:
+    axes, speed = figure.subplots(3, 5), "airspeed, kn"
+    for column, nacelle in enumerate((90, 75, 60, 30, 0)):
+        for row, (axis, words) in enumerate((("roll", "roll"), ("yaw", "yaw"))):
+            lines = [Line(series=f"lateral.{axis}_power.n{nacelle}", label="X62407")]
+            panel(axes[row][column], validation, lines, x="", y=f"{words}, rad/s2 per in", title=f"nacelle {nacelle}")
+            axes[row][column].set_ylim(bottom=0.0)
+        if nacelle:
+            lines = [Line(series=f"lateral.bank_after_1s.n{nacelle}", label="X62407")]
+            panel(axes[2][column], validation, lines, x=speed, y="bank after 1 s, deg per in")
+            axes[2][column].set_ylim(bottom=0.0)
+    lines = [
+        Line(series="lateral.bank_airplane.clean", label="X62407, flaps up, 3.36 in, 1.9 s"),
+        Line(series="lateral.bank_airplane.flaps", label="X62407, flaps 40, 4.8 in, 1.8 s", colour=ORANGE, marker="o",
+             model="model, flaps 40", model_colour=GREEN),
+    ]  # fmt: skip
+    panel(axes[2][4], validation, lines, x=speed, y="bank, deg")
+
+
 def _fidelity(validation: Validation, figure: Figure) -> None:
     axes = figure.subplots(1, 1)
     results = [one for one in validation.of_group("fidelity") if one.check.band is not None]
@@ -359,6 +378,13 @@ FIGURES: tuple[PlannedFigure, ...] = (
     PlannedFigure("validation_climb", "climb", "Climb and autorotation", _climb, (13.0, 4.0)),
     PlannedFigure("validation_hover", "hover", "Hover weights against height, and hover ceiling", _hover, (10.0, 4.2)),
     PlannedFigure("validation_dynamics", "dynamics", "Roots in hover, controls, responses", _dynamics, (13.0, 4.6)),
+    PlannedFigure(
+        "validation_lateral",
+        "lateral",
+        "Control power and roll response against the charts of 1975",
+        _lateral,
+        (17.0, 9.6),
+    ),
     PlannedFigure("validation_fidelity", "fidelity", "LPV aircraft against the nonlinear one", _fidelity, (8.0, 3.8)),
 )
 """The figures, in the order of the report."""

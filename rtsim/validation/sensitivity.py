@@ -98,6 +98,12 @@ UNCERTAIN = (
               why="14300 to 21360 slug ft2 are printed; 10 %"),
     Uncertain(name="tail pressure", key="htail.K_q", low=0.9, high=1.1, share=True,
               why="dynamic pressure at the tail, 10 %"),
+    Uncertain(name="fin area", key="lateral.fin_area_each_ft2", low=20.25, high=25.25,
+              why="both are printed in one report"),
+    Uncertain(name="sidewash at fins", key="lateral.rotor_sidewash", low=False, high=True,
+              why="one printed table, with the nacelles up inferred"),
+    Uncertain(name="rotation", key="lateral.rotation", low=-1.0, high=1.0,
+              why="outboard by the arrows of TM X-62407 fig 2.1; the other way for comparison"),
 )  # fmt: skip
 """The uncertain inputs, in the order of the table."""
 

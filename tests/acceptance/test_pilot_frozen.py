@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from docs.margins import BEGIN, LEAST_GAIN_DB, LEAST_PHASE_DEG, PAGE, margins, margins_at
 from rtsim.analysis.frozen_loop import FrozenCommand, frozen_loop, stability_map
-from rtsim.analysis.lateral_loop import lateral_stability_map
+from rtsim.analysis.lateral_loop import lateral_stability_map, lateral_tables
 from rtsim.choices import OUTER_LOOPS, OuterLoop
 from rtsim.lpv.files.storage import load_database
 from rtsim.lpv.lpv_kernels import lpv_step, work_size
@@ -37,6 +40,36 @@ def test_the_lateral_half_is_stable_at_every_valid_point_and_mid_cell(mid_cells:
     assert np.isfinite(result.growth).sum() > (500 if mid_cells else 600)
     assert result.unstable == []
     assert np.nanmax(result.growth) < -0.03
+
+
+def test_the_lateral_half_keeps_its_margins() -> None:
+    """A sample of the grid; where a margin is short the page names it."""
+    sample = margins(every=60)
+    assert len(sample) > 10
+    table = PAGE.read_text(encoding="utf-8").split(BEGIN)[1]
+    named = {
+        row.split("|")[1].split(",")[1].strip(): row.split("|")[-2] for row in table.split("\n\n")[0].splitlines()[3:5]
+    }
+    assert set(named) == {"lateral stick", "pedal"}
+    for point in sample:
+        for hand, exceptions in enumerate(named.values()):
+            short = point.phase_deg[hand] < LEAST_PHASE_DEG or point.gain_db[hand] < LEAST_GAIN_DB
+            assert not short or f"{point.name} " in exceptions, point
+
+
+def test_the_page_tells_the_weakest_margins_as_they_are() -> None:
+    """The first that docs/six-degrees.md names for each hand, at the grid points and in the middles of cells."""
+    tables = lateral_tables(DATABASE)
+    table = PAGE.read_text(encoding="utf-8").split(BEGIN)[1]
+    rows = re.findall(
+        r"^\| (?:grid|middles).*?\| (\S+) at ([-\d.]+)/([-\d.]+).*?\| (\S+) at ([-\d.]+)/([-\d.]+)", table, re.MULTILINE
+    )
+    assert len(rows) == 4
+    for number, (phase, *at_phase, gain, v, n) in enumerate(rows):
+        hand = number % 2
+        found = [margins_at(DATABASE, tables, kt(float(a)), deg(float(b))) for a, b in (at_phase, (v, n))]
+        assert found[0].phase_deg[hand] == pytest.approx(float(phase), abs=0.4)
+        assert found[1].gain_db[hand] == pytest.approx(float(gain), abs=0.1)
 
 
 @pytest.mark.parametrize("mid_cells", [False, True])

@@ -6,7 +6,19 @@ from collections.abc import Callable
 from functools import cache
 
 from rtsim.validation.check import Check
-from rtsim.validation.declared import climb, dynamics, fidelity, flapping, hover, loads, power, rotor, stall, trims
+from rtsim.validation.declared import (
+    climb,
+    dynamics,
+    fidelity,
+    flapping,
+    hover,
+    lateral,
+    loads,
+    power,
+    rotor,
+    stall,
+    trims,
+)
 
 GROUPS: dict[str, tuple[str, Callable[[], list[Check]]]] = {
     "trims": ("Level-flight trims", trims.checks),
@@ -18,6 +30,7 @@ GROUPS: dict[str, tuple[str, Callable[[], list[Check]]]] = {
     "climb": ("Climb, autorotation, level speed", climb.checks),
     "hover": ("Hover", hover.checks),
     "dynamics": ("Control and identified responses", dynamics.checks),
+    "lateral": ("Out of the plane of symmetry", lateral.checks),
     "fidelity": ("The LPV aircraft against the nonlinear one", fidelity.checks),
 }
 """Title and checks of each group, in the order of the report."""
