@@ -74,7 +74,7 @@ def twin_margins(corridor, airspeed, angle):
 @given(corridors, airspeeds, angles)
 def test_kernel_equals_the_numpy_twin(corridor, airspeed, angle):
     out = np.empty(4)
-    corridor_margins(corridor.tables(), airspeed, angle, out)
+    corridor_margins(corridor.tables(), airspeed, angle, 0.0, out)
     low, high, allowed = twin_margins(corridor, airspeed, angle)
     assert out[0] == pytest.approx(low, abs=1e-9)
     assert out[1] == pytest.approx(high, abs=1e-9)

@@ -86,7 +86,7 @@ from rtsim.corridor.boundaries import load_corridor
 from rtsim.corridor.corridor_kernels import corridor_margins
 from rtsim.kernels.kept import kept
 out = np.zeros(4)
-corridor_margins(load_corridor("design").tables(), 50.0, 1.0, out)
+corridor_margins(load_corridor("design").tables(), 50.0, 1.0, 0.0, out)
 print(out.tolist(), kept("piece", b"", lambda: [1, 2]))
 """
 

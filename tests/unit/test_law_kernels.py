@@ -10,10 +10,12 @@ import pytest
 from rtsim.command import SENSOR
 from rtsim.corridor.boundaries import load_corridor
 from rtsim.errors import InputError
+from rtsim.loop.data import CHANNEL
 from rtsim.lpv.aircraft import load_aircraft
 from rtsim.lpv.files.storage import load_database
 from rtsim.protection import law_data as data
 from rtsim.protection import law_kernels as kernels
+from rtsim.protection.prediction_kernels import CELL
 from rtsim.protection.tables import LAW_NAMES, law_tables
 from rtsim.units import INCH_POUND, deg, kt
 
@@ -44,14 +46,14 @@ class Bench:
         self.sensors[SENSOR.flapping] = np.hypot(point.x[7], point.x[9])
         self.sensors[SENSOR.on_downstop] = float(nacelle_deg <= 0.5)
         self.sensors[SENSOR.nacelle_ok] = 1.0
-        self.trim = np.array([point.u[0], point.u[1], 0.0])
+        self.trim = np.array([point.u[0], point.u[1], 0.0, 0.0, 0.0])
         self.frame = 0
         self.work = np.zeros(data.WORK_SIZE)
 
-    def step(self, stick=0.0, lever=0.0, rate=0.0, frames=1):
+    def step(self, stick=0.0, lever=0.0, rate=0.0, frames=1, lateral=0.0, pedal=0.0):
         """Apply a command, given as differences from trim."""
-        command = self.trim + np.array([stick, lever, rate])
-        applied = np.zeros(3)
+        command = self.trim + np.array([stick, lever, rate, lateral, pedal])
+        applied = np.zeros(CHANNEL.size)
         for _ in range(frames):
             kernels.protect(self.tables, self.state, self.frame, self.sensors, command, applied, self.work)
             self.frame += 1
@@ -67,8 +69,8 @@ class Bench:
 def test_a_trimmed_aircraft_well_inside_is_left_alone_bit_for_bit(tables, law, airspeed, nacelle):
     bench = Bench(tables[law], airspeed, nacelle)
     for k in range(60):
-        command = bench.trim + np.array([0.01 * np.sin(k), 0.002 * np.cos(k), 0.0])
-        applied = np.zeros(3)
+        command = bench.trim + np.array([0.01 * np.sin(k), 0.002 * np.cos(k), 0.0, 0.0, 0.0])
+        applied = np.zeros(CHANNEL.size)
         kernels.protect(bench.tables, bench.state, k, bench.sensors, command, applied, bench.work)
         assert applied.tolist() == command.tolist()
         assert bench.cause("stick") == bench.cause("lever") == bench.cause("rate") == data.REASON_NONE
@@ -132,7 +134,7 @@ def test_full_takes_over_before_the_low_side_and_gives_back(tables):
     bench.sensors[SENSOR.airspeed_rate] = 0.0
     bench.step(frames=5)
     assert 0.9 < bench.state[data.LAW.blend] < 1.0
-    np.testing.assert_array_equal(bench.step(frames=700), [0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(bench.step(frames=700), np.zeros(CHANNEL.size))
     assert bench.cause("lever") == data.REASON_NONE
 
 
@@ -184,7 +186,7 @@ def test_full_keeps_the_mast_torque(tables):
 def test_full_keeps_the_flapping(tables):
     """Hover, full stick: settled flapping stays at 10.5 deg, where the bare stick asks for more than the stop."""
     bench = Bench(tables["full"], 0.0, 90.0)
-    model, cell = tables["full"].model, np.zeros(59)
+    model, cell = tables["full"].model, np.zeros(CELL.size)
     from rtsim.protection import prediction_kernels as prediction
 
     prediction.model_at(model, 0.0, deg(90.0), cell)
@@ -221,7 +223,7 @@ def test_a_law_that_cannot_see_does_not_act_and_recovers(tables, law, place, val
     good = bench.sensors[place]
     bench.sensors[place] = value
     unseen = bench.step(lever=0.01, rate=-deg(7.5), frames=10)
-    np.testing.assert_array_equal(unseen, [0.0, applied_lever(bench, 0.01), -deg(7.5)])
+    np.testing.assert_array_equal(unseen, [0.0, applied_lever(bench, 0.01), -deg(7.5), 0.0, 0.0])
     bench.sensors[place] = good
     applied = bench.step(rate=-deg(7.5), frames=50)
     assert np.isfinite(applied).all()
@@ -232,17 +234,18 @@ def test_a_law_that_cannot_see_does_not_act_and_recovers(tables, law, place, val
 def test_a_command_that_is_no_number_is_answered_with_what_acted_last(tables):
     for law in LAW_NAMES:
         bench = Bench(tables[law])
-        bench.step(stick=0.02, lever=0.01, frames=5)
-        command, applied = np.full(3, np.nan), np.zeros(3)
+        bench.step(stick=0.02, lever=0.01, lateral=0.03, pedal=-0.04, frames=5)
+        command, applied = np.full(CHANNEL.size, np.nan), np.zeros(CHANNEL.size)
         kernels.protect(bench.tables, bench.state, 7, bench.sensors, command, applied, bench.work)
-        np.testing.assert_allclose(applied - bench.trim, [0.02, 0.01, 0.0], atol=1e-12)
+        np.testing.assert_allclose(applied - bench.trim, [0.02, 0.01, 0.0, 0.03, -0.04], atol=1e-12)
 
 
 def test_override_gives_the_authority_to_the_pilot_and_back(tables):
     bench = Bench(tables["full"], CORRIDOR.low_speed(deg(50.0)) / kt(1.0) + 1.0)
     bench.step(rate=-deg(7.5), lever=-0.1, frames=100)
     bench.state[data.LAW.override] = 1.0
-    np.testing.assert_allclose(bench.step(rate=-deg(7.5), lever=-0.1, frames=20), [0.0, -0.1, -deg(7.5)], atol=1e-15)
+    passed = bench.step(rate=-deg(7.5), lever=-0.1, frames=20)
+    np.testing.assert_allclose(passed, [0.0, -0.1, -deg(7.5), 0.0, 0.0], atol=1e-15)
     assert bench.state[data.LAW.side] != 0.0 or bench.state[data.LAW.time] > 0.0
     bench.state[data.LAW.override] = 0.0
     assert bench.step(rate=-deg(7.5), lever=-0.1)[2] >= 0.0

@@ -131,9 +131,9 @@ def test_normalized_distance_is_euclidean_and_signed(monitor):
     corridor = load_corridor("flight")
     tables = monitor.tables
     # Beside the flat high side the distance is the speed margin in tens of knots.
-    assert kernels.normalized_distance(tables, kt(150.0), deg(30.0)) == pytest.approx(2.0)
-    assert kernels.normalized_distance(tables, kt(175.0), deg(30.0)) == pytest.approx(-0.5)
-    assert kernels.normalized_distance(tables, kt(230.0), 0.0) == pytest.approx(3.0)
+    assert kernels.normalized_distance(tables, kt(150.0), deg(30.0), 0.0) == pytest.approx(2.0)
+    assert kernels.normalized_distance(tables, kt(175.0), deg(30.0), 0.0) == pytest.approx(-0.5)
+    assert kernels.normalized_distance(tables, kt(230.0), 0.0, 0.0) == pytest.approx(3.0)
     # A brute-force search over the boundary finds the same distance.
     angles = deg(np.linspace(0.0, 95.0, 190001))
     for speed, angle in ((80.0, 66.0), (100.0, 40.0), (20.0, 85.0), (120.0, 70.0)):
@@ -142,7 +142,7 @@ def test_normalized_distance_is_euclidean_and_signed(monitor):
             x = (np.asarray(line.at(angles)) / KNOT - speed) / 10.0
             y = (angles / DEGREE - angle) / 10.0
             best = min(best, float(np.hypot(x, y).min()))
-        got = kernels.normalized_distance(tables, kt(speed), deg(angle))
+        got = kernels.normalized_distance(tables, kt(speed), deg(angle), 0.0)
         assert abs(got) == pytest.approx(best, abs=2e-3)
         assert (got > 0.0) == corridor.inside(kt(speed), deg(angle))
 
@@ -323,7 +323,7 @@ def test_a_new_limit_needs_the_kernel_and_the_data_alone(tmp_path):
     """A toy limit has its margin, level, unit and number wherever limits are."""
     text = (ROOT / "rtsim/protection/monitor_kernels.py").read_text(encoding="utf-8")
     for place, line in (
-        ('    "rotor_endurance": "rotor endurance",\n', '    "climb": "climb rate",\n'),
+        ('    "sideslip": "sideslip",\n', '    "climb": "climb rate",\n'),
         ("LIMIT_NUMBERS = {\n", '    "climb": ("climb_m_s", 0.0, 100.0),\n'),
         (
             "    nz = sensors[SENSOR.load_factor]\n",

@@ -275,7 +275,10 @@ def flown() -> tuple[FloatArray, Programme]:
     rows = history(
         frames,
         margin_kt=wandering(3.0, 8.0),
-        flapping_deg=np.abs(wandering(8.0, 12.0)),
+        flapping_deg=np.abs(wandering(7.0, 9.0)),
+        flapping_left_deg=np.abs(wandering(8.0, 12.0)),
+        flapping_right_deg=np.abs(wandering(8.0, 12.0)),
+        climb_rate_m_s=wandering(0.0, 5.0),
         airspeed_kt=np.interp(time, [0.0, 35.0], [60.0, 119.5]) + wandering(0.0, 0.2),
         airspeed_reference_kt=np.interp(time, [0.0, 36.0], [60.0, 120.0]),
         nacelle_deg=np.interp(time, [0.0, 33.0], [80.0, 20.0]),
@@ -286,7 +289,9 @@ def flown() -> tuple[FloatArray, Programme]:
         stick=wandering(0.1, 0.5),
         lever=wandering(0.5, 0.4),
         control_on_stop=now_and_then((0.0, 0.0, 1.0)),
-        mast_torque_inlb=wandering(120e3, 30e3),
+        mast_torque_inlb=wandering(110e3, 20e3),
+        mast_torque_left_inlb=wandering(120e3, 30e3),
+        mast_torque_right_inlb=wandering(120e3, 30e3),
         engine_power_shp=wandering(1500.0, 900.0),
         load_factor=wandering(1.2, 2.0),
         protection_stick_reason=now_and_then((0.0, 0.0, 1.0, 9.0)),
@@ -301,7 +306,7 @@ def flown() -> tuple[FloatArray, Programme]:
         bank_reference_deg=wandering(0.0, 40.0),
         heading_deg=wandering(180.0, 170.0),
         heading_reference_deg=wandering(180.0, 170.0),
-        sideslip_deg=wandering(0.0, 9.0),
+        sideslip_deg=wandering(0.0, 30.0),
         lateral_kt=wandering(0.0, 9.0),
         north_m=wandering(5.0, 90.0),
         east_m=wandering(-5.0, 90.0),
@@ -317,7 +322,10 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
     def of(name: str) -> FloatArray:
         return rows[:, getattr(COLUMN, name)]
 
-    time, margin, flapping, pitch = of("time_s"), of("margin_kt"), of("flapping_deg"), of("pitch_deg")
+    time, margin, pitch = of("time_s"), of("margin_kt"), of("pitch_deg")
+    sides = ("", "_left", "_right")
+    flapping = np.max([of(f"flapping{side}_deg") for side in sides], axis=0)
+    mast_torque = np.max([of(f"mast_torque{side}_inlb") for side in sides], axis=0)
     error, height = of("airspeed_kt") - of("airspeed_reference_kt"), of("altitude_m") - of("altitude_reference_m")
     controls = {}
     inches = ("_in", "_in_s")
@@ -336,7 +344,11 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
     banked, turned_by = bank - of("bank_reference_deg"), of("heading_deg") - of("heading_reference_deg")
     astray = np.abs((turned_by + 180.0) % 360.0 - 180.0)
     takeoff = (of("nacelle_deg") > 80.0) & (of("airspeed_kt") < 60.0)
-    torque = of("mast_torque_inlb") / np.where(takeoff, 163e3, 130e3)
+    bank_allowed = np.interp(of("nacelle_deg"), [75.0, 90.0], [45.0, 35.0])
+    sideward_allowed = np.interp(np.abs(of("airspeed_kt")), [60.0, 100.0], [30.0, 21.0])
+    forward = np.sqrt((of("airspeed_kt") * KNOT) ** 2 + of("climb_rate_m_s") ** 2 + 4.5**2) / KNOT
+    sideward = np.abs(np.tan(np.radians(of("sideslip_deg")))) * forward
+    torque = mast_torque / np.where(takeoff, 163e3, 130e3)
     reasons = np.stack([of(f"protection_{name}_reason") for name in ("stick", "lever", "nacelle")])
     corridor = np.isin(reasons, (1.0, 2.0, 3.0)).any(axis=0)
     starts = np.flatnonzero(corridor & ~np.concatenate(([False], corridor[:-1])))
@@ -374,6 +386,11 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
         "pitch_beyond_deg": np.abs(pitch).max() - 25.0,
         "pitch_excursion_deg": np.ptp(pitch),
         "pitch_rate_rms_deg_s": np.sqrt(np.mean(of("pitch_rate_deg_s") ** 2)),
+        "bank_beyond_deg": (np.abs(bank) - bank_allowed).max(),
+        "bank_peak_deg": np.abs(bank).max(),
+        "bank_over_s": (np.abs(bank) > bank_allowed).sum() * DT,
+        "sideslip_beyond_kt": (sideward - sideward_allowed).max(),
+        "sideslip_over_s": (sideward > sideward_allowed).sum() * DT,
         "bank_min_deg": bank.min(),
         "bank_max_deg": bank.max(),
         "bank_rms_error_deg": np.sqrt(np.mean(banked**2)),
@@ -395,7 +412,7 @@ def twin(rows: FloatArray, programme: Programme) -> dict[str, float]:
         "controls_on_stop_frames": of("control_on_stop").sum(),
         "torque_ratio_peak": torque.max(),
         "torque_over_s": (torque > 1.02).sum() * DT,
-        "mast_torque_max_inlb": of("mast_torque_inlb").max(),
+        "mast_torque_max_inlb": mast_torque.max(),
         "engine_power_max_shp": of("engine_power_shp").max(),
         "fuel_used_lb": of("fuel_flow_lb_h").sum() * DT / 3600.0,
         "energy_mj": of("engine_power_shp").sum() * DT * 745.6998715822702e-6,
