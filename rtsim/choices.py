@@ -32,3 +32,7 @@ HAND_PILOT = "mavlink"
 """A person behind MAVLink; the built-in pilot holds the start until the first sticks arrive."""
 PASSIVE_LAWS = frozenset({"off", "monitor"})
 """Protection that changes no command."""
+
+Leavable = Literal["corridor", "flapping", "torque", "load_factor", "pitch", "bank", "sideslip", "control", "height"]
+LEAVABLE: tuple[Leavable, ...] = get_args(Leavable)
+"""What a flight can be found to violate: corridor, limits besides it, keeping control to the end, height."""

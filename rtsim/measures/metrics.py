@@ -15,6 +15,7 @@ import numpy as np
 
 from rtsim.aircraft.profile import AircraftProfile
 from rtsim.arrays import BoolArray, FloatArray
+from rtsim.choices import LEAVABLE
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_COUNT
 from rtsim.kernels.parts import entry_point
@@ -25,11 +26,9 @@ from rtsim.programme import Programme
 from rtsim.protection.limits import load_limits
 from rtsim.units import to_deg
 
-SECONDARY_LIMITS = ("flapping", "torque", "load_factor", "pitch", "bank", "sideslip", "control")
+SECONDARY_LIMITS = LEAVABLE[1:-1]
 """Limits besides the corridor, by name: flapping, 1.02 of the torque limit, load factor, pitch, bank, sideslip, and
 keeping control to the end."""
-LEAVABLE = ("corridor", *SECONDARY_LIMITS, "height")
-"""What an unprotected flight can be expected to violate."""
 VACUOUS_HEIGHT = 30.0
 """Height loss that counts as a violation of ``height`` [m]."""
 

@@ -17,6 +17,7 @@ from rtsim.errors import InputError
 from rtsim.faults.fault import Actuator, Control, Fault, FaultKind, Stop
 from rtsim.loop.option_tables import table_fields
 from rtsim.loop.options import declared
+from rtsim.loop.script import Channel, Shape
 from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
@@ -118,14 +119,14 @@ class NacelleDraw(Strict):
 class PulseDraw(Strict):
     """One of ``pulses``: movements of a control, one after the other."""
 
-    channel: Literal["stick", "lever", "switch", "lateral_stick", "pedal"]
+    channel: Channel
     count: Number = 1.0
     time_s: Number = 2.0
     duration_s: Number
     gap_s: Number = 0.0
     amount: Number
     either_sign: bool = False
-    shape: Literal["step", "doublet", "sine"] = "step"
+    shape: Shape = "step"
     period_s: Number = 1.0
     replaces: bool = False
 

@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from rtsim.choices import Leavable
+from rtsim.loop.script import Channel, Shape
 from rtsim.strict import Strict
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -14,11 +16,11 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 class PulseTable(Strict):
     """One of ``[[pulses]]``: what a hand does to a control besides the pilot."""
 
-    channel: Literal["stick", "lever", "switch", "lateral_stick", "pedal"]
+    channel: Channel
     time_s: Annotated[float, Field(ge=0.0, le=36_000.0, allow_inf_nan=False)]
     duration_s: Annotated[float, Field(gt=0.0, le=36_000.0, allow_inf_nan=False)]
     amount: Annotated[float, Field(ge=-12.0, le=12.0, allow_inf_nan=False)]
-    shape: Literal["step", "doublet", "sine"] = "step"
+    shape: Shape = "step"
     period_s: Annotated[float, Field(ge=0.05, le=600.0, allow_inf_nan=False)] = 1.0
     replaces: bool = False
 
@@ -38,7 +40,7 @@ class TrialTable(Strict):
 
     kind: Literal["nominal", "misuse", "failure", "unprotectable"]
     law: Annotated[str | None, Field(max_length=200)] = None
-    off_leaves: list[Literal["corridor", "flapping", "torque", "load_factor", "pitch", "control", "height"]] = []
+    off_leaves: list[Leavable] = []
     off_depth_kt: Annotated[float, Field(ge=0.0, le=300.0)] = 0.0
     no_harm_height_m: Annotated[float, Field(ge=0.0, le=1000.0)] = 30.0
     expect: Annotated[list[TrialExpectTable], Field(max_length=1000)] = []
