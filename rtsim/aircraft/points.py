@@ -65,7 +65,8 @@ class TrimPoint:
     residual: float
     """Largest residual, accelerations in m/s^2 and rad/s^2."""
     unclosed: str = ""
-    """Name of the state whose rate did not close (``elevator``: the stick would pass its stop); empty if converged."""
+    """Name of the state whose rate did not close (``elevator``: the stick would pass its stop) or of a control that
+    would pass its stop, or in words what ends the validity; empty if converged."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,7 +63,8 @@ class AskedCondition:
     def solves_nonlinear(self) -> bool:
         """Whether the nonlinear model must be solved: the database holds one condition only."""
         asked = (self.flap_deg, self.rotor_rpm, self.acceleration_kt_s)
-        return self.nonlinear or self.asks_condition or self.sideways or any(value is not None for value in asked)
+        turns = self.sideways and self.database is None
+        return self.nonlinear or self.asks_condition or turns or any(value is not None for value in asked)
 
     @property
     def sideways(self) -> bool:
@@ -260,20 +261,41 @@ def database_trim(request: AskedCondition) -> tuple[dict[str, Any], TrimPoint]:
         The result by JSON key, and the trim.
 
     Raises:
-        InputError: The condition is outside the database.
+        InputError: The condition is outside the database, or is a turn or sideslip and the database knows the plane of
+            symmetry only.
     """
+    from rtsim.aircraft.variables import ALL_INPUTS, ALL_OUTPUTS, ALL_STATES
     from rtsim.units import deg, kt, to_deg, to_rpm
 
     aircraft = lpv_aircraft(request)
     airspeed, nacelle = kt(request.airspeed_kt), deg(request.nacelle_deg)
-    point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
     database = aircraft.database
+    if request.sideways:
+        point = _sideways_trim(request, aircraft)
+        values = named(point, ALL_STATES, ALL_INPUTS, ALL_OUTPUTS)
+    else:
+        point = aircraft.trim(airspeed=airspeed, nacelle=nacelle)
+        values = named(point, database.states, database.inputs, database.outputs)
     flap = aircraft.flap(airspeed=airspeed, nacelle=nacelle)
-    values = named(point, database.states, database.inputs, database.outputs)
     configuration = (to_deg(flap), to_rpm(database.governed_speed))
     where = (request.airspeed_kt, request.nacelle_deg)
     thinner = _thinner(request)
     return trim_result(where, "database", database.profile, values, configuration, point.converged, thinner), point
+
+
+def _sideways_trim(request: AskedCondition, aircraft: LpvAircraft) -> TrimPoint:
+    """Trim the LPV aircraft in a turn, in sideslip or in sideward flight."""
+    from rtsim.analysis.sideways_trim import sideways_trim
+    from rtsim.lpv.aircraft import LpvAircraft
+    from rtsim.lpv.flown import flown_database
+
+    if aircraft.database.lateral is None:
+        solve = ", or solve the nonlinear model (--nonlinear)" if aircraft.database.profile.is_xv15 else ""
+        raise InputError(
+            "the database knows the plane of symmetry only, and a turn or sideslip is asked for",
+            key="--database", value=str(request.database), mend=f"take one with a lateral half{solve}",
+        )  # fmt: skip
+    return sideways_trim(LpvAircraft(flown_database(aircraft.database)), asked_condition(request))
 
 
 def solvable(request: AskedCondition) -> AskedCondition:
@@ -338,6 +360,8 @@ def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
     Returns:
         The error to raise.
     """
+    from rtsim.analysis.sideways_trim import VALIDITY
+
     where = f"{request.airspeed_kt:g} kn at nacelle {request.nacelle_deg:g} deg"
     for name, words in (
         ("bank_deg", "bank {:g} deg"),
@@ -348,7 +372,10 @@ def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
             where += ", " + words.format(getattr(request, name)) + _reached(request, point)
     if point.unclosed in STOPPED:
         where += f": {STOPPED[point.unclosed]} would pass its stop"
-    left = f"; '{point.unclosed}' does not close" if point.unclosed not in {"", *STOPPED} else ""
+    elif point.unclosed in VALIDITY.values():
+        where += f": {point.unclosed}"
+    closes = point.unclosed in {"", *STOPPED, *VALIDITY.values()}
+    left = "" if closes else f"; '{point.unclosed}' does not close"
     mend = "see where the aircraft flies with 'rtsim corridor'"
     if not request.solves_nonlinear:
         mend += ", or solve exactly there with --nonlinear"

@@ -36,11 +36,9 @@ _ACCELERATION = typer.Option(help="Acceleration in level flight [kn/s]; solves t
 _DATABASE = typer.Option(help="Another LPV database than the shipped one (.nc or .mat).")
 _CLOSED_LOOP = typer.Option("--closed-loop", help="Aircraft, pilot and outer loops together, sampled as flown.")
 _OUTER_LOOP = typer.Option(help="How the pilot holds airspeed and altitude: integrators or pi (with --closed-loop).")
-_BANK = typer.Option(help="Bank angle of a coordinated level turn, right positive [deg]; solves the nonlinear model.")
-_SLIP = typer.Option(
-    help="Sideslip in straight flight, wind from the right positive [deg]; solves the nonlinear model."
-)
-_SIDE = typer.Option(help="Airspeed to the right, besides the one ahead [kn]; solves the nonlinear model.")
+_BANK = typer.Option(help="Bank angle of a coordinated level turn, right positive [deg].")
+_SLIP = typer.Option(help="Sideslip in straight flight, wind from the right positive [deg].")
+_SIDE = typer.Option(help="Airspeed to the right, besides the one ahead [kn].")
 _AXIS = typer.Option(help="Motion in the plane of symmetry, out of it, or both: longitudinal, lateral or both.")
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 
@@ -76,9 +74,9 @@ def trim_command(
     the edge of what the database covers, where a grid point around has no trim, the nonlinear model is asked too.
 
     Turns, sideslip and sideward flight (one of --bank-deg, --sideslip-deg, --lateral-kt) are solved by the nonlinear
-    model; a wind from any direction is an airspeed ahead (negative: from behind) and one to the right. Where there is
-    no such flight it says how far there is one and what ends it. Example: rtsim trim --airspeed-kt 80 --nacelle-deg 75
-    --bank-deg 30.
+    model, or, with --database FILE, by the LPV aircraft of that file as far as it is valid; a wind from any direction
+    is an airspeed ahead (negative: from behind) and one to the right. Where there is no such flight it says how far
+    there is one and what ends it. Example: rtsim trim --airspeed-kt 80 --nacelle-deg 75 --bank-deg 30.
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,

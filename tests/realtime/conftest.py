@@ -1,15 +1,17 @@
-"""A source and a sink with the interfaces of the executive, for tests of the pacing alone."""
+"""A source and a sink with the interfaces of the executive, for tests of the pacing alone; flights and a station."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS
+from tests.ground_station import Flight, Station
 
 
 class CountingSource:
@@ -86,3 +88,25 @@ def _make_source() -> type[CountingSource]:
 @pytest.fixture(name="sink")
 def _sink() -> ListSink:
     return ListSink()
+
+
+@pytest.fixture(name="start")
+def _start(tmp_path: Path) -> Iterator[Callable[..., Flight]]:
+    flights: list[Flight] = []
+
+    def start(port: int, *options: str) -> Flight:
+        flights.append(Flight(port, tmp_path, *options))
+        return flights[-1]
+
+    yield start
+    for flight in flights:
+        if flight.process.poll() is None:
+            flight.process.kill()
+            flight.process.communicate()
+
+
+@pytest.fixture(name="station")
+def _station() -> Iterator[Station]:
+    station = Station()
+    yield station
+    station.close()

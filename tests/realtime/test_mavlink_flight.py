@@ -1,14 +1,11 @@
-"""Real clients fly the real aircraft: a scripted hand, MAVSDK, MAVProxy, and what a flood may not do."""
+"""Real clients fly the real aircraft: sticks and their loss, MAVSDK, MAVProxy, and what a flood may not do."""
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import queue
 import re
-import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -17,223 +14,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN
-from rtsim.processes import safe_environment
 from scenarios.flight.replay import replay_log
 from telemetry.log.reader import read_log
+from tests.ground_station import free_port
 
 pytestmark = pytest.mark.realtime
-
-KNOT = 1852.0 / 3600.0
-FORWARD, AFT = 1 << 5, 1 << 4
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
-        sock.bind(("127.0.0.1", 0))
-        return sock.getsockname()[1]
-
-
-class Flight:
-    """``rtsim fly manual_flight --pilot mavlink`` in its own process."""
-
-    def __init__(self, port, folder, *options):
-        self.log = folder / "flight.parquet"
-        environment = safe_environment() | {"XDG_CONFIG_HOME": str(folder / "config")}
-        self.process = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "rtsim", "fly", "manual_flight", "--pilot", "mavlink", "--headless", "--json"),
-                *("--mavlink", f"127.0.0.1:{port}", "--log", str(self.log), *options),
-            ],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    def end(self):
-        """Stop it if it flies, and give its summary."""
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        output, errors = self.process.communicate(timeout=20)
-        assert output, errors
-        return json.loads(output.splitlines()[-1])
-
-
-@pytest.fixture(name="start")
-def _start(tmp_path):
-    flights = []
-
-    def start(port, *options):
-        flights.append(Flight(port, tmp_path, *options))
-        return flights[-1]
-
-    yield start
-    for flight in flights:
-        if flight.process.poll() is None:
-            flight.process.kill()
-            flight.process.communicate()
-
-
-class Station:
-    """A small ground station."""
-
-    def __init__(self, system=255):
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind(("127.0.0.1", 0))
-        self.socket.setblocking(False)
-        self.port = self.socket.getsockname()[1]
-        self.vehicle = None
-        self.last, self.values, self.heard = {}, {}, []
-        self._encoder, self._decoder = dialect.MAVLink(None, srcSystem=system, srcComponent=190), dialect.MAVLink(None)
-        self._beat = 0.0
-
-    def send(self, message):
-        self.socket.sendto(message.pack(self._encoder), self.vehicle)
-        self._encoder.seq = (self._encoder.seq + 1) % 256
-
-    def poll(self):
-        """Take what came; a heartbeat goes out once a second."""
-        while True:
-            try:
-                data, self.vehicle = self.socket.recvfrom(4096)
-            except BlockingIOError:
-                break
-            message = self._decoder.decode(bytearray(data))
-            name = message.get_type()
-            self.last[name] = message
-            self.heard.append((time.monotonic(), message))
-            if name == "NAMED_VALUE_FLOAT":
-                self.values[message.name] = message.value
-        if self.vehicle is not None and time.monotonic() - self._beat > 1.0:
-            self._beat = time.monotonic()
-            self.send(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-
-    def wait_for(self, condition, timeout_s=5.0):
-        """Poll until a condition holds."""
-        end = time.monotonic() + timeout_s
-        while not condition():
-            assert time.monotonic() < end, "nothing came of it"
-            self.poll()
-            time.sleep(0.002)
-
-    def wait_for_flight(self, flight):
-        def flies():
-            if flight.process.poll() is not None:
-                pytest.fail(flight.process.communicate()[1])
-            return "ATTITUDE" in self.last and "RC_CHANNELS" in self.last and self.values
-
-        self.wait_for(flies, 150.0)  # the kernels may have to be compiled first
-
-    def since(self, name, moment):
-        return [(at, message) for at, message in self.heard if message.get_type() == name and at >= moment]
-
-    def sticks(self, x=0, z=500, buttons=0):
-        self.send(dialect.MAVLink_manual_control_message(1, x, 0, z, 0, buttons))
-
-    def hold(self, seconds, **sticks):
-        """Send sticks 50 times a second."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            self.poll()
-            self.sticks(**sticks)
-            time.sleep(0.02)
-
-    def close(self):
-        self.socket.close()
-
-
-@pytest.fixture(name="station")
-def _station():
-    station = Station()
-    yield station
-    station.close()
-
-
-class ScriptedHand:
-    """Stick, lever and nacelle buttons from what telemetry shows: hover, conversion, cruise, back, and down."""
-
-    def __init__(self, lever, height_m):
-        self.lever0, self.height = lever, height_m
-        self.reference, self.phase, self.held = 0.0, "out", 0.0
-        self.lever_sum = self.pitch_sum = 0.0
-
-    def step(self, *, speed_kt, height_m, climb_m_s, pitch_deg, nacelle_deg, dt):
-        goal, rate = (155.0, 2.5) if self.phase == "out" else (0.0, 2.0)
-        ahead = float(np.clip(self.reference, speed_kt - 8.0, speed_kt + 8.0))
-        self.reference = ahead + float(np.clip(goal - ahead, -rate * dt, rate * dt))
-        speed_error = self.reference - speed_kt
-        if self.phase == "land":
-            self.height = max(self.height - 1.2 * dt, height_m - 3.0)
-        climb = float(np.clip(0.25 * (self.height - height_m), -1.2, 2.0)) - climb_m_s
-        share = float(np.clip((nacelle_deg - 30.0) / 40.0, 0.0, 1.0))  # 1: the lever holds the height, 0: the pitch
-        self.lever_sum += dt * (0.04 * share * climb + 0.004 * (1.0 - share) * speed_error)
-        lever = self.lever0 + self.lever_sum + 0.06 * share * climb + 0.012 * (1.0 - share) * speed_error
-        self.pitch_sum += dt * (-0.10 * share * speed_error + (1.0 - share) * 0.8 * climb)
-        self.pitch_sum = float(np.clip(self.pitch_sum, -8.0, 8.0))
-        wanted = np.clip(1.0 + self.pitch_sum - 0.7 * share * speed_error + 1.6 * (1.0 - share) * climb, -9.0, 10.0)
-        stick = float(np.clip(-0.12 * (wanted - pitch_deg), -0.6, 0.6))
-        steady = abs(climb_m_s) < 0.7 and (
-            (self.phase == "out" and nacelle_deg < 0.5 and abs(speed_kt - 155.0) < 3.0)
-            or (self.phase == "back" and nacelle_deg > 89.5 and abs(speed_kt) < 5.0)
-        )
-        self.held = self.held + dt if steady else 0.0
-        if self.held > 3.0:
-            self.phase, self.held = ("back" if self.phase == "out" else "land"), 0.0
-        return stick, float(np.clip(lever, 0.0, 1.0)), self._nacelle(nacelle_deg)
-
-    def _nacelle(self, nacelle_deg):
-        if self.phase == "out":
-            wanted = np.interp(self.reference, [0.0, 60.0, 100.0, 125.0, 140.0], [82.0, 75.0, 60.0, 30.0, 0.0])
-            return FORWARD if nacelle_deg > wanted + 0.3 else 0
-        wanted = np.interp(self.reference, [30.0, 65.0, 100.0, 120.0, 135.0], [90.0, 75.0, 60.0, 30.0, 0.0])
-        return AFT if nacelle_deg < wanted - 0.3 else 0
-
-
-@pytest.mark.slow
-def test_a_hand_flies_out_and_back_and_lands_and_the_log_replays(start, station):
-    flight = start(station.port, "--speed", "3", "--altitude-m", "40", "--duration", "400")
-    station.wait_for_flight(flight)
-    hand = ScriptedHand((station.last["RC_CHANNELS"].chan3_raw - 1000) / 1000.0, 40.0)
-    phases, before = [], station.last["ATTITUDE"].time_boot_ms
-    end = time.monotonic() + 150.0
-    while flight.process.poll() is None and time.monotonic() < end:
-        station.poll()
-        now = station.last["ATTITUDE"].time_boot_ms
-        if now > before:
-            position, hud = station.last["LOCAL_POSITION_NED"], station.last["VFR_HUD"]
-            along = position.vx * math.cos(math.radians(hud.heading)) + position.vy * math.sin(
-                math.radians(hud.heading)
-            )
-            stick, lever, buttons = hand.step(
-                speed_kt=along / KNOT,
-                height_m=-position.z,
-                climb_m_s=-position.vz,
-                pitch_deg=math.degrees(station.last["ATTITUDE"].pitch),
-                nacelle_deg=station.values["nac_deg"],
-                dt=(now - before) / 1000.0,
-            )
-            station.sticks(round(1000 * stick), round(1000 * lever), buttons)
-            before = now
-            if hand.phase not in phases:
-                phases.append(hand.phase)
-        station.heard.clear()
-        time.sleep(0.003)
-    summary = flight.end()
-    assert phases == ["out", "back", "land"]
-    assert "touched down gently" in summary["end_reason"]
-    assert summary["completed"]
-    assert flight.process.returncode == 0
-    assert summary["corridor"]["exceedances"] == 0
-    assert summary["corridor"]["worst_margin_kt"] > 5.0
-    log = read_log(flight.log)
-    assert np.min(log.history[:, COLUMN.nacelle_deg]) < 0.5
-    assert np.max(log.history[:, COLUMN.airspeed_kt]) > 150.0
-    result = replay_log(flight.log)
-    assert result.same, result.difference
-    assert result.stated_sha256 == summary["history_sha256"]
 
 
 def test_sticks_reach_the_aircraft_at_once_and_their_loss_is_handled(start, station):
@@ -408,6 +195,57 @@ def test_mavsdk_flies_it(start, mavsdk_client):
     assert replay_log(flight.log).same
 
 
+def test_mavsdk_sees_heading_and_track_go_with_its_stick(start, mavsdk_client):
+    """Stick to the left in forward flight: bank, heading, track and position turn to the left together."""
+    from mavsdk.plugins.manual_control import ManualControl
+    from mavsdk.plugins.telemetry import Telemetry
+
+    port = free_port()
+    flight = start(port, "--start", "conversion", "--altitude-m", "300", "--heading-deg", "20", "--duration", "120")
+    mavsdk_client.add_any_connection(f"udpin://127.0.0.1:{port}")
+    system = mavsdk_client.first_autopilot(150.0)
+    telemetry, controls = Telemetry(system), ManualControl(system)
+    end = time.monotonic() + 60.0
+    while not (telemetry.health_all_ok() and telemetry.position_velocity_ned().velocity.north_m_s > 30.0):
+        assert time.monotonic() < end, "no telemetry"
+        time.sleep(0.02)
+    assert telemetry.heading().heading_deg == pytest.approx(20.0, abs=0.5)
+    lever = telemetry.fixedwing_metrics().throttle_percentage
+    begin, seen, sticks = time.monotonic(), [], []
+    while (seconds := time.monotonic() - begin) < 14.0:
+        angle, rate = telemetry.attitude_euler(), telemetry.attitude_angular_velocity_body()
+        bank = -12.0 if 1.0 < seconds < 9.0 else 0.0
+        stick = 1.9 * math.radians(bank - angle.roll_deg) - 1.2 * rate.roll_rad_s
+        controls.set_manual_control_input(0.0, stick, lever, -1.5 * rate.yaw_rad_s)
+        moved = telemetry.position_velocity_ned()
+        track = math.degrees(math.atan2(moved.velocity.east_m_s, moved.velocity.north_m_s))
+        place = moved.position.north_m, moved.position.east_m
+        seen.append((seconds, angle.roll_deg, angle.yaw_deg, telemetry.heading().heading_deg, track, *place))
+        sticks.append(stick)
+        time.sleep(0.02)
+    assert replay_log(end_of(flight)).same
+    when, bank, yaw, heading, track, north, east = np.array(seen).T
+    assert min(sticks) < -0.1
+    assert bank.min() < -8.0
+    assert np.abs(turned_deg(heading - yaw)).max() < 2.0  # heading comes ten times a second
+    assert np.abs(turned_deg(track - yaw)).max() < 5.0
+    assert -30.0 < turned_deg(yaw[-1] - yaw[0]) < -8.0
+    late = when > when[-1] - 2.0
+    flown = math.degrees(math.atan2(east[-1] - east[late][0], north[-1] - north[late][0]))
+    assert abs(turned_deg(flown - track[late].mean())) < 2.0
+
+
+def turned_deg(angle):
+    """An angle between -180 and 180 deg."""
+    return (angle + 180.0) % 360.0 - 180.0
+
+
+def end_of(flight):
+    """End a flight without a fault, and give its log."""
+    assert flight.end()["mavlink"]["faults"] == 0
+    return flight.log
+
+
 class Console:
     """MAVProxy behind pipes."""
 
@@ -446,6 +284,16 @@ class Console:
     def type(self, line):
         self.process.stdin.write(f"{line}\n".encode())
         self.process.stdin.flush()
+
+    def shown(self, message, *fields):
+        """Numbers of the newest message of a kind."""
+        self.type(f"status {message}")
+        return [
+            float(number)
+            for number in self.expect(
+                rf"{message} {{.*?" + ".*?".join(rf"\b{field} : (-?[\d.e-]+)" for field in fields)
+            ).groups()
+        ]
 
     def close(self):
         self.process.kill()
@@ -492,3 +340,48 @@ def test_mavproxy_flies_it(start, tmp_path):
         console.close()
     assert flight.end()["mavlink"]["faults"] == 0
     assert replay_log(flight.log).same
+
+
+def test_mavproxy_sees_heading_and_track_go_with_its_sticks(start, tmp_path):
+    """Channel 1 to the right in forward flight: bank, heading, track and position turn to the right together."""
+    port = free_port()
+    flight = start(port, "--start", "conversion", "--altitude-m", "300", "--duration", "120")
+    console = Console(port, tmp_path)
+    try:
+        console.expect("Detected vehicle 1:1", 150.0)
+        console.expect(r"Received (\d+) parameters", 30.0)
+
+        def look():
+            roll, yaw = console.shown("ATTITUDE", "roll", "yaw")
+            latitude, longitude, north, east, heading = console.shown(
+                "GLOBAL_POSITION_INT", "lat", "lon", "vx", "vy", "hdg"
+            )
+            (course,) = console.shown("GPS_RAW_INT", "cog")
+            directions = math.degrees(yaw), heading / 100.0, math.degrees(math.atan2(east, north)), course / 100.0
+            return math.degrees(roll), np.array(directions), latitude, longitude
+
+        roll, before, *_ = look()
+        assert roll == pytest.approx(0.0, abs=0.1)
+        np.testing.assert_allclose(turned_deg(before), 0.0, atol=0.2)
+        (throttle,) = console.shown("VFR_HUD", "throttle")
+        console.type(f"rc 3 {1000 + 10 * throttle + 20:.0f}")
+        console.expect("your sticks fly")
+        console.type(f"rc 3 {1000 + 10 * throttle:.0f}")
+        console.type("rc 1 1560")
+        time.sleep(1.2)
+        assert console.shown("RC_CHANNELS", "chan1_raw") == [1560.0]
+        console.type("rc 1 1500")
+        time.sleep(4.0)
+        roll, after, latitude, longitude = look()
+        time.sleep(1.0)
+        _, later, further_north, further_east = look()
+        assert 3.0 < roll < 30.0
+        assert np.all(turned_deg(after - before) > 2.0)
+        assert np.all(turned_deg(later - after) > 0.5)
+        assert np.abs(turned_deg(after - after[0])).max() < 6.0  # sideslip, and up to half a second between messages
+        east = (further_east - longitude) * math.cos(math.radians(latitude / 1e7))
+        flown = math.degrees(math.atan2(east, further_north - latitude))
+        assert abs(turned_deg(flown - 0.5 * (after[3] + later[3]))) < 4.0
+    finally:
+        console.close()
+    assert replay_log(end_of(flight)).same

@@ -6,6 +6,7 @@ on that branch, and a step that does not arrive is halved; where the steps get t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -163,9 +164,40 @@ def solve_steady(tables: AircraftTables, condition: Condition) -> TrimPoint:
     if not start.converged:
         return _widened(start)
     z, jacobian = unknowns_of(whole(start.x, ALL_STATES), whole(start.u, ALL_INPUTS)), np.zeros((UNKNOWN.size,) * 2)
-    done, share, point = 0.0, min(1.0, LARGEST_STEP[int(goal.kind)] / abs(goal.side)), steady_point(tables, goal, z)
+
+    def find(flight: Steady, guess: FloatArray) -> FloatArray | None:
+        found = newton(tables, flight, guess, jacobian)
+        if found is None:
+            jacobian[:] = 0.0
+        return found
+
+    def point(flight: Steady, found: FloatArray, reached: bool) -> TrimPoint:
+        return steady_point(tables, flight, found, reached=reached)
+
+    return continued(goal, z, find, point)
+
+
+def continued(
+    goal: Steady,
+    z: FloatArray,
+    find: Callable[[Steady, FloatArray], FloatArray | None],
+    point: Callable[[Steady, FloatArray, bool], TrimPoint],
+) -> TrimPoint:
+    """Follow the branch of an aircraft's steady flights from the symmetric one.
+
+    Args:
+        goal: The flight at its end.
+        z: Unknowns of the symmetric flight; pitch and turn stand where ``UNKNOWN`` has them.
+        find: Gives the unknowns of a flight from a guess; None where there are none.
+        point: Makes a trim of a flight and its unknowns, or, where the third argument is False, of the last before the
+            end of the branch.
+
+    Returns:
+        The flight asked for, or the last before the branch ends.
+    """
+    done, share = 0.0, min(1.0, LARGEST_STEP[int(goal.kind)] / abs(goal.side))
     before: tuple[float, FloatArray] | None = None
-    while done < 1.0:
+    while True:
         part = min(done + share, 1.0)
         flight = goal._replace(side=part * goal.side)
         guess = z.copy()
@@ -173,19 +205,17 @@ def solve_steady(tables: AircraftTables, condition: Condition) -> TrimPoint:
             guess += (part - done) / (done - before[0]) * (z - before[1])
         if goal.kind == SIDE.turn and before is None:  # a coordinated turn to begin with
             guess[UNKNOWN.turn] = 9.80665 * np.tan(flight.side) / max(abs(goal.airspeed), 1.0)
-        found = newton(tables, flight, guess, jacobian)
+        found = find(flight, guess)
         if found is None:
-            jacobian[:] = 0.0
             share *= 0.5
             if share < _SMALLEST_SHARE:
-                return steady_point(tables, flight, z, reached=False)
+                return point(flight, z, False)
             continue
         before, z, done = (done, z), found, part
-        point = steady_point(tables, flight, z)
-        if not point.converged:
-            return point
+        reached = point(flight, z, True)
+        if done >= 1.0 or not reached.converged:
+            return reached
         share = min(share * 1.5, 1.0)
-    return point
 
 
 def _widened(point: TrimPoint) -> TrimPoint:

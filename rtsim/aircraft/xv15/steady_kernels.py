@@ -18,7 +18,7 @@ from rtsim.aircraft.variables import ALL_INPUTS, ALL_STATES, INPUT, STATE
 from rtsim.aircraft.xv15.dynamics_kernels import WORK_COUNT, derivative
 from rtsim.aircraft.xv15.tables import AircraftTables
 from rtsim.arrays import FloatArray
-from rtsim.kernels.compiled import kernel
+from rtsim.kernels.compiled import inner_kernel, kernel
 from rtsim.places import Places
 
 UNKNOWN = Places(
@@ -66,20 +66,18 @@ class Steady(NamedTuple):
     """Lateral airspeed or velocity [m/s], sideslip or bank [rad]."""
 
 
-@kernel
-def steady_vectors(tables: AircraftTables, flight: Steady, z: FloatArray, x: FloatArray, u: FloatArray) -> None:
-    """State and inputs of a set of unknowns; the actuators stand where the controls ask them to, stops ignored.
+@inner_kernel
+def steady_motion(flight: Steady, pitch: float, turn: float, x: FloatArray) -> None:
+    """Velocities, rates and attitude of a steady flight.
 
     Args:
         flight: What is flown.
-        z: Unknowns.
-        x: Written: state.
-        u: Written: inputs.
+        pitch: Pitch attitude [rad].
+        turn: Bank [rad]; in a turn the turn rate [rad/s].
+        x: Their places are written.
     """
-    controls, lateral = tables.controls, tables.lateral.controls
-    nacelle, pitch = flight.nacelle, z[UNKNOWN.pitch]
     turning = flight.kind == SIDE.turn
-    bank, turn_rate = (flight.side, z[UNKNOWN.turn]) if turning else (z[UNKNOWN.turn], 0.0)
+    bank, turn_rate = (flight.side, turn) if turning else (turn, 0.0)
     st, ct, sb, cb = math.sin(pitch), math.cos(pitch), math.sin(bank), math.cos(bank)
     ahead, across = flight.airspeed, flight.side
     if flight.kind == SIDE.sideslip:
@@ -91,13 +89,28 @@ def steady_vectors(tables: AircraftTables, flight: Steady, z: FloatArray, x: Flo
         across = (flight.side - ahead * sb * st) / cb
     elif turning:
         across = -ahead * sb * st / cb
-    x[:] = 0.0
-    u[:] = 0.0
     x[STATE.u] = ahead * ct
     x[STATE.v] = ahead * sb * st + across * cb
     x[STATE.w] = ahead * cb * st - across * sb
     x[STATE.p], x[STATE.q], x[STATE.r] = -turn_rate * st, turn_rate * ct * sb, turn_rate * ct * cb
     x[STATE.pitch], x[STATE.bank] = pitch, bank
+
+
+@kernel
+def steady_vectors(tables: AircraftTables, flight: Steady, z: FloatArray, x: FloatArray, u: FloatArray) -> None:
+    """State and inputs of a set of unknowns; the actuators stand where the controls ask them to, stops ignored.
+
+    Args:
+        flight: What is flown.
+        z: Unknowns.
+        x: Written: state.
+        u: Written: inputs.
+    """
+    controls, lateral = tables.controls, tables.lateral.controls
+    nacelle = flight.nacelle
+    x[:] = 0.0
+    u[:] = 0.0
+    steady_motion(flight, z[UNKNOWN.pitch], z[UNKNOWN.turn], x)
     for k in range(6):
         x[ROTOR_STATES[k]] = z[UNKNOWN.mean + k]
         x[DIFFERENCE_STATES[k]] = z[UNKNOWN.difference + k]
