@@ -48,8 +48,10 @@ def explain(error: ValidationError, model: type[BaseModel], file: str | None) ->
         One :class:`InputError` per problem, in the order of the file's keys.
     """
     found: dict[str, InputError] = {}
-    for item in error.errors():
-        location = tuple(part for part in item["loc"] if not _is_union_tag(part))
+    places = [tuple(part for part in item["loc"] if not _is_union_tag(part)) for item in error.errors()]
+    for item, location in zip(error.errors(), places, strict=True):
+        if isinstance(item["input"], list) and any(place[:-1] == location for place in places):
+            continue  # where a value or a list of them may stand, the entry that is wrong says it
         key = dotted(location)
         found.setdefault(key, _explain_one(item, location, key, model, file))
     return list(found.values())
