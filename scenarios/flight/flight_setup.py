@@ -6,9 +6,11 @@ import dataclasses
 import math
 from typing import Any, get_type_hints
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from rtsim.aircraft.condition import AircraftName
+from rtsim.corridor.boundaries import STRAIGHT
 from rtsim.loop.aircraft import database_of
 from rtsim.loop.simulation import FlightSetup
 from rtsim.programme import Programme
@@ -44,7 +46,7 @@ def corridor_outline(name: str, aircraft: AircraftName = "") -> CorridorOutline:
         name: ``design``, ``flight`` or ``model``.
         aircraft: A database file, empty for the shipped XV-15, or a condition.
     """
-    corridor = load_boundary(name, database_of(aircraft) if aircraft else None)
+    corridor = load_boundary(name, database_of(aircraft))
     high_nacelle = [0.0, corridor.downstop_nacelle, *(float(v) for v in corridor.high.nacelle)]
     high_nacelle = sorted({angle for angle in high_nacelle if angle >= 0.0})
     high = [(to_deg(angle), to_kt(float(corridor.high.at(angle)))) for angle in high_nacelle]
@@ -52,7 +54,12 @@ def corridor_outline(name: str, aircraft: AircraftName = "") -> CorridorOutline:
     corners = sorted({*high_nacelle, *(float(n) for n in corridor.low.nacelle)})
     centre = [(to_deg(angle), to_kt(float(corridor.centre_speed(angle)))) for angle in corners]
     lines = [tuple(zip(*line, strict=True)) for line in (low, high, centre)]
-    return CorridorOutline.from_lines(name, low=lines[0], high=lines[1], centre=lines[2])
+    turning = corridor.turning
+    angles = [] if turning is STRAIGHT else np.degrees(turning.nacelle).tolist()
+    moved = [[to_kt(float(value)) for value in side[: len(angles)]] for side in (turning.low, turning.high)]
+    return CorridorOutline.from_lines(
+        name, low=lines[0], high=lines[1], centre=lines[2], turn_low=(angles, moved[0]), turn_high=(angles, moved[1])
+    )
 
 
 def replay_setup(scenario: Scenario) -> dict[str, Any]:

@@ -34,6 +34,8 @@ _NEAR_KT, _NEAR_DEG = 14.0, 3.0
 _COLOURS = ("#1f6fb4", "#e07b00", "#2a9d54", "#b0309a", "#6a51c4", "#0f9b9b", "#a05a2c", "#444444", "#c23b3b")
 _LOW, _HIGH, _INSIDE = "#d98a00", "#d03c3c", "#2a9d54"
 _ACTING = "#b030c0"
+_WORTH_SHOWING = 1.02
+"""Load factor of a turn from which it is drawn: 11 deg of bank."""
 _LEVELS = ((-np.inf, 0.0, "#d03c3c"), (0.0, 4.0, "#f08030"), (4.0, 10.0, "#f5c842"))
 
 
@@ -253,6 +255,7 @@ def _draw_corridor(log: FlightLog, figure: Figure) -> None:
         if outline.centre_kt:
             axes.plot(outline.centre_kt, outline.centre_nacelle_deg, "--", color="#777777", label="centre line")
         _fill_inside(axes, outline)
+        _draw_turn(axes, log, outline)
         axes.set_title(f"Conversion corridor '{outline.name}'")
         _tell_downstop(axes, log, outline)
     axes.plot(
@@ -275,6 +278,18 @@ def _fill_inside(axes: Axes, outline: CorridorOutline) -> None:
         order = np.argsort(nacelles)
         sides.append(np.interp(angles, np.array(nacelles)[order], np.array(speeds)[order]))
     axes.fill_betweenx(angles, *sides, color=_INSIDE, alpha=0.08, linewidth=0)
+
+
+def _draw_turn(axes: Axes, log: FlightLog, outline: CorridorOutline) -> None:
+    """Where the steepest turn of the flight has moved the sides."""
+    bank = min(float(np.abs(log["bank_deg"]).max()), 60.0)
+    load = 1.0 / np.cos(np.radians(bank))
+    if load < _WORTH_SHOWING:
+        return
+    for side, colour in (("low", _LOW), ("high", _HIGH)):
+        nacelles, speeds = outline.turned(side, load)
+        words = f"in a turn of {bank:.0f} deg of bank" if side == "low" else None
+        axes.plot(speeds, nacelles, "--", color=colour, linewidth=1.2, label=words)
 
 
 def _tell_downstop(axes: Axes, log: FlightLog, outline: CorridorOutline) -> None:

@@ -5,6 +5,7 @@ One knot is one unit to the right, one degree of nacelle angle is 2.7 units up; 
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import Any
 
@@ -14,7 +15,7 @@ from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.colours import CYAN, DIM, FRAME, GRID, HIGH_SIDE, LEVELS, LOW_SIDE, TEXT, TRAIL, WHITE
-from telemetry.view.strokes import LineArt
+from telemetry.view.strokes import Colour, LineArt
 
 UNITS_PER_DEGREE = 2.7
 """Vertical scale."""
@@ -24,6 +25,8 @@ HIGHEST_DEG = 95.0
 """Nacelle angle at the upper edge."""
 BOUNDS = ((-74.0, 214.0), (-16.0, 286.0))
 """What the view shows: x range, y range."""
+TURN_STEP = 0.04
+"""Steps of load factor in which the sides of a turn are drawn: 2 kn at most."""
 TRAIL_POINTS = 400
 """Longest trail, in points half a second apart."""
 
@@ -51,6 +54,7 @@ class CorridorPlot:
         self._updates = 0
         self._trail: list[list[float]] = []
         self._trail_time = -math.inf
+        self._outline, self._turn = outline, 1.0
         axes = LineArt()
         if outline is not None:
             _fill_inside(axes, outline)
@@ -66,6 +70,7 @@ class CorridorPlot:
             margins = LineArt()
             self._draw_margins(margins, row)
             self._recording.log("corridor/margins", margins.archetype(2.5))
+            self._show_turn(float(row[COLUMN.bank_deg]))
         self._updates += 1
         art = LineArt()
         point_x, point_y = min(max(speed, SLOWEST_KT), FASTEST_KT), height_of(nacelle)
@@ -83,6 +88,20 @@ class CorridorPlot:
                 trail = LineArt()
                 trail.line(self._trail, TRAIL, radius=-1.4)
                 self._recording.log("corridor/trail", trail.archetype(2.0))
+
+    def _show_turn(self, bank_deg: float) -> None:
+        """Dashed sides where a turn has moved them, in steps of load factor that the eye can tell apart."""
+        load = round(1.0 / math.cos(math.radians(min(abs(bank_deg), 60.0))) / TURN_STEP) * TURN_STEP
+        if self._outline is None or load == self._turn:
+            return
+        self._turn = load
+        art = LineArt()
+        for side, colour in (("low", LOW_SIDE), ("high", HIGH_SIDE)) if load > 1.0 else ():
+            nacelles, speeds = self._outline.turned(side, load)
+            line = _place(tuple(nacelles), tuple(speeds)) if nacelles else np.zeros((0, 2))
+            for start, end in itertools.pairwise(line):
+                _dash(art, start, end, colour, radius=-1.6)
+        self._recording.log("corridor/turn", art.archetype(1.0))
 
     @staticmethod
     def _draw_margins(art: LineArt, row: FloatArray) -> None:
@@ -170,9 +189,9 @@ def _place(nacelles: tuple[float, ...], speeds: tuple[float, ...]) -> FloatArray
     return points
 
 
-def _dash(art: LineArt, start: FloatArray, end: FloatArray) -> None:
+def _dash(art: LineArt, start: FloatArray, end: FloatArray, colour: Colour = DIM, radius: float = -0.7) -> None:
     """Dashes of three units between two points."""
     length = float(np.hypot(*(end - start)))
     for begin in np.arange(0.0, length, 6.0):
         pair = [start + (end - start) * min(1.0, at / length) for at in (begin, begin + 3.0)]
-        art.line(np.array(pair), DIM, radius=-0.7)
+        art.line(np.array(pair), colour, radius=radius)
