@@ -37,6 +37,9 @@ def corridor_command(
     ] = "design",
     airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed of a point [kn].")] = None,
     nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle of the point [deg], 90 helicopter.")] = None,
+    bank_deg: Annotated[
+        float, typer.Option(help="Bank of a level turn [deg]: its load factor moves the sides.", min=-60.0, max=60.0)
+    ] = 0.0,
     consistency: Annotated[
         bool, typer.Option("--consistency", help="Say where the corridor allows what the aircraft cannot trim.")
     ] = False,
@@ -53,7 +56,7 @@ def corridor_command(
 
     point = _point(airspeed_kt, nacelle_deg)
     flown = FlightOptions().changed(options)
-    if corridor == "model" or flown.database:
+    if corridor == "model" or flown.database or bank_deg:
         from rtsim.loop.aircraft import database_of
         from rtsim.protection.boundary import load_boundary
 
@@ -61,13 +64,16 @@ def corridor_command(
     else:
         chosen = load_corridor(corridor).in_true_airspeed(flown.condition.true_over_calibrated)
     result: dict[str, Any] = {"corridor_name": chosen.name, "boundaries": _boundaries(chosen)}
+    load = 1.0 / math.cos(deg(bank_deg))
+    if bank_deg:
+        result["turn"] = _turn_result(chosen, bank_deg, load)
     if point is not None:
-        margins = chosen.margins(kt(point[0]), deg(point[1]))
+        margins = chosen.margins(kt(point[0]), deg(point[1]), deg(bank_deg))
         result |= _point_result(chosen, point, margins)
     if consistency:
         result["consistency"] = _inconsistencies(chosen, flown.aircraft)
     if plot is not None:
-        _draw(chosen, point, plot)
+        _draw(chosen, point, plot, load)
         result["plot_file"] = str(plot)
     if json:
         emit_json(result)
@@ -75,7 +81,7 @@ def corridor_command(
     if point is not None:
         _print_point(result)
     else:
-        _print_table(chosen)
+        _print_table(chosen, load)
     if consistency:
         _print_consistency(result["consistency"])
     if plot is not None:
@@ -153,6 +159,22 @@ def _boundaries(corridor: Corridor) -> dict[str, Any]:
     }
 
 
+def _turn_result(corridor: Corridor, bank_deg: float, load: float) -> dict[str, Any]:
+    """Where both sides lie in a level turn."""
+    import numpy as np
+
+    from rtsim.units import deg, to_kt
+
+    angles = deg(1.0) * np.array(_TABLE_ANGLES_DEG[::-1])
+    sides = {"low_kt": corridor.low_speed(angles, load), "high_kt": corridor.high_speed(angles, load)}
+    return {
+        "bank_deg": bank_deg,
+        "load_factor": round(load, _DIGITS),
+        "nacelle_deg": list(_TABLE_ANGLES_DEG[::-1]),
+        **{name: [round(to_kt(float(speed)), _DIGITS) for speed in np.asarray(side)] for name, side in sides.items()},
+    }
+
+
 def _point_result(corridor: Corridor, point: tuple[float, float], margins: Margins) -> dict[str, Any]:
     from rtsim.units import deg, to_deg, to_kt
 
@@ -186,16 +208,18 @@ def _print_point(result: dict[str, Any]) -> None:
     results.print(f"  nacelle travel aft             {result['nacelle_aft_deg']:+8.1f} deg")
 
 
-def _print_table(corridor: Corridor) -> None:
+def _print_table(corridor: Corridor, load: float) -> None:
     from rich.table import Table
 
     from rtsim.units import deg, to_kt
 
-    table = Table(title=corridor.title)
+    turn = "" if load == 1.0 else f", level turn at load factor {load:.2f}"
+    table = Table(title=f"{corridor.title}{turn}")
     for heading in ("nacelle [deg]", "low [kn]", "centre [kn]", "high [kn]"):
         table.add_column(heading, justify="right")
     for angle in _TABLE_ANGLES_DEG:
-        speeds = (corridor.low_speed(deg(angle)), corridor.centre_speed(deg(angle)), corridor.high_speed(deg(angle)))
+        low, high = corridor.low_speed(deg(angle), load), corridor.high_speed(deg(angle), load)
+        speeds = (low, corridor.centre_speed(deg(angle)), high)
         # Adding zero turns a rounded -0.0 into 0.0.
         table.add_row(f"{angle:g}", *(f"{round(to_kt(float(speed)), 1) + 0.0:.1f}" for speed in speeds))
     results.print(table)
@@ -204,7 +228,7 @@ def _print_table(corridor: Corridor) -> None:
 
 
 @drawing()
-def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> None:
+def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path, load: float) -> None:
     """Draw the corridor, airspeed across and nacelle angle up, helicopter mode on top as in the paper."""
     import numpy as np
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -214,7 +238,7 @@ def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> 
 
     end = min(corridor.low.nacelle[-1], corridor.high.nacelle[-1])
     angle = np.union1d(np.linspace(0.0, end, 191), [corridor.downstop_nacelle, corridor.downstop_nacelle * 1.0001])
-    low, high = np.asarray(corridor.low_speed(angle)), np.asarray(corridor.high_speed(angle))
+    low, high = np.asarray(corridor.low_speed(angle, load)), np.asarray(corridor.high_speed(angle, load))
     figure = Figure(figsize=(7.0, 5.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -225,12 +249,17 @@ def _draw(corridor: Corridor, point: tuple[float, float] | None, path: Path) -> 
     axes.plot(
         to_kt(high), to_deg(angle), color="#d03c3c", linewidth=2.0, label=_wrapped(f"high side: {corridor.high.kind}")
     )
+    if load != 1.0:
+        for side in (corridor.low_speed(angle), corridor.high_speed(angle)):
+            axes.plot(to_kt(np.asarray(side)), to_deg(angle), color="#888888", linewidth=0.9)
+        axes.plot([], [], color="#888888", linewidth=0.9, label="in straight flight")
     axes.plot(to_kt(np.asarray(corridor.centre_speed(angle))), to_deg(angle), "k--", linewidth=1.0, label="centre line")
     if point is not None:
         axes.plot(point[0], point[1], "o", color="#1d3557", label=f"{point[0]:g} kn, {point[1]:g} deg")
     axes.set(
-        xlabel="airspeed [kn]", ylabel="nacelle angle [deg], 90 helicopter", title=corridor.title, ylim=(-2.0, 97.0)
-    )
+        xlabel="airspeed [kn]", ylabel="nacelle angle [deg], 90 helicopter", ylim=(-2.0, 97.0),
+        title=corridor.title if load == 1.0 else f"{corridor.title}, turn at load factor {load:.2f}",
+    )  # fmt: skip
     if point is None:
         downstop = f"downstop: to {to_kt(corridor.downstop_speed):.0f} kn"
         axes.annotate(downstop, (195.0, 2.0), fontsize="small")

@@ -122,22 +122,28 @@ class Corridor:
             downstop_speed=self.downstop_speed * factor,
         )
 
-    def low_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
+    def low_speed(self, nacelle_angle: float | FloatArray, load_factor: float = 1.0) -> float | FloatArray:
         """Lowest allowed airspeed, signed [m/s].
 
         Args:
             nacelle_angle: Nacelle angle, one value or an array [rad].
+            load_factor: That of a level turn.
         """
-        return self.low.at(nacelle_angle)
+        moved = np.interp(nacelle_angle, self.turning.nacelle, self.turning.low)
+        speed = self.low.at(nacelle_angle) + (load_factor - 1.0) * moved
+        return float(speed) if np.ndim(speed) == 0 else np.asarray(speed)
 
-    def high_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
+    def high_speed(self, nacelle_angle: float | FloatArray, load_factor: float = 1.0) -> float | FloatArray:
         """Highest allowed airspeed [m/s]; steps up on the downstop.
 
         Args:
             nacelle_angle: Nacelle angle, one value or an array [rad].
+            load_factor: That of a level turn.
         """
         on_downstop = np.asarray(nacelle_angle) <= self.downstop_nacelle
-        speed = np.where(on_downstop, self.downstop_speed, self.high.at(nacelle_angle))
+        moved = np.interp(nacelle_angle, self.turning.nacelle, self.turning.high)
+        off_it = self.high.at(nacelle_angle) + (load_factor - 1.0) * moved
+        speed = np.where(on_downstop, self.downstop_speed, off_it)
         return float(speed) if speed.ndim == 0 else speed
 
     def centre_speed(self, nacelle_angle: float | FloatArray) -> float | FloatArray:
