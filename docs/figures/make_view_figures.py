@@ -36,6 +36,7 @@ PICTURES = {
     "view_pilot": ("typical_conversion", "pilot", "monitor", 40.0),
     "view_engineer": ("typical_conversion", "engineer", "monitor", 40.0),
     "view_protection": ("ep06_overspeed", "pilot", "full", 22.0),
+    "view_turn_protection": ("ep21_steep_turn", "pilot", "full", 14.0),
 }
 """Scenario, layout, protection and time [s] of each picture of a scenario, flown in real time."""
 _STRAIGHT = (TURN.bank, 0.0)

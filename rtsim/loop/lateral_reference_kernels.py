@@ -28,6 +28,8 @@ HEADING_BANK = 20.0 * DEGREE
 """Bank of the turn onto a heading [rad]."""
 HEADING_TURN_RATE = 12.0 * DEGREE
 """Fastest turn onto a heading [rad/s]: in hover a turn needs no bank."""
+LARGEST_LEAD = 30.0 * DEGREE
+"""Heading asked for less that of an aircraft that does not follow, at most [rad]: a pilot sees where his nose is."""
 LINE_RATE = 0.12
 """Rate at which the pilot closes in on his line [1/s]."""
 ON_LINE, TURNS_ONTO = 1.0, 2.0
@@ -229,7 +231,8 @@ def move_lateral_reference(
     before = reference[REFERENCE.turn_rate]
     reference[REFERENCE.turn_acceleration] += dt * _jerk(reference, turn_rate)
     reference[REFERENCE.turn_rate] += dt * reference[REFERENCE.turn_acceleration]
-    reference[REFERENCE.heading] += 0.5 * dt * (before + reference[REFERENCE.turn_rate])
+    moved = reference[REFERENCE.heading] + 0.5 * dt * (before + reference[REFERENCE.turn_rate])
+    reference[REFERENCE.heading] = min(max(moved, x[STATE.heading] - LARGEST_LEAD), x[STATE.heading] + LARGEST_LEAD)
     _follow(reference, REFERENCE.lateral, REFERENCE.lateral_rate, lateral, dt)
 
 

@@ -16,12 +16,13 @@ from rtsim.frame import QUANTITY
 from rtsim.kernels.compiled import inner_kernel
 from rtsim.kernels.grid_kernels import cell_below
 from rtsim.kernels.parts import call_at
-from rtsim.loop.data import CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Flight
+from rtsim.loop.data import CHANNEL, CLOCK, KNOWN, MOTION, PART, PROGRAMME, REFERENCE, Flight
 from rtsim.loop.lateral_reference_kernels import ON_LINE, beside_line, fill_wanted, from_point, turn_wanted
 from rtsim.lpv.schedule_kernels import scheduling_alpha
 from rtsim.nacelle.nacelle_kernels import nacelle_assigned_rate, nacelle_at, on_downstop
 from rtsim.pilot.lateral_kernels import WANTED
 from rtsim.pilot.layout_kernels import TARGET
+from rtsim.protection.law_data import LAW
 from rtsim.systems.drive_kernels import DEVIATION, HELD_OFFSET, engine_power, rotor_speed_now, schedule_angle
 from rtsim.systems.engine_kernels import TANK, advance_ratio, fuel_flow, takeoff_power, thrust_over_solidity
 from rtsim.systems.flap_kernels import flap_inputs, flap_now
@@ -30,6 +31,8 @@ from rtsim.units import GRAVITY
 
 STANDSTILL = 0.05
 """Motion over the ground that has no course [m/s]."""
+LARGEST_TURN = 1.2
+"""Bank up to which a turn rate is reckoned from it [rad]."""
 
 
 @inner_kernel
@@ -297,8 +300,24 @@ def _ask_sideways(flight: Flight, low: int, share: float) -> None:
     for k in range(len(asked)):
         scratch.known[KNOWN.asked + k] = asked[k]
     fill_wanted(state.reference, asked, state.x, scratch.known[KNOWN.wind_right], scratch.wanted)
-    slope = max(scratch.wanted[WANTED.airspeed], 0.0) * scratch.wanted[WANTED.turn_rate] / GRAVITY
+    slope = max(scratch.wanted[WANTED.airspeed], 0.0) * _turn_flown(flight) / GRAVITY
     scratch.target[TARGET.turn_excess] = math.sqrt(1.0 + slope * slope) - 1.0
+
+
+@inner_kernel
+def _turn_flown(flight: Flight) -> float:
+    """Turn rate that the pilot's symmetric half reckons with [rad/s]: the one asked for.
+
+    Where a law takes the lateral stick, he feels it, and reckons with no more than that of the bank he sees.
+    """
+    state = flight.state
+    asked = state.reference[REFERENCE.turn_rate]
+    limited = state.protection[LAW.lateral_cause] != 0.0 or not math.isnan(state.held[CHANNEL.lateral_stick])
+    if not limited or asked == 0.0:
+        return float(asked)
+    speed = max(state.reference[REFERENCE.airspeed], 1.0)
+    there = GRAVITY * math.tan(min(max(state.x[STATE.bank], -LARGEST_TURN), LARGEST_TURN)) / speed
+    return float(min(max(there, 0.0), asked) if asked > 0.0 else max(min(there, 0.0), asked))
 
 
 @inner_kernel
@@ -333,7 +352,7 @@ def _see(flight: Flight, airspeed: float) -> None:
         # asked for does not need.
         sine, cosine = math.sin(x[STATE.bank]), math.cos(x[STATE.bank])
         seen[STATE.w] = seen[STATE.v] * sine + seen[STATE.w] * cosine
-        seen[STATE.q] = x[STATE.q] - state.reference[REFERENCE.turn_rate] * math.cos(x[STATE.pitch]) * sine
+        seen[STATE.q] = x[STATE.q] - _turn_flown(flight) * math.cos(x[STATE.pitch]) * sine
 
 
 @inner_kernel
