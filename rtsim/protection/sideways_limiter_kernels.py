@@ -181,70 +181,132 @@ def _bound_twist(tables: ProtectionTables, state: FloatArray, cell: FloatArray, 
 
 
 @inner_kernel
-def limit_sideways(tables: ProtectionTables, state: FloatArray, cell: FloatArray, sensors: FloatArray) -> None:
-    """Bound the lateral stick so that bank stays inside, and the pedals so that sideslip does.
+def _learn(
+    tables: ProtectionTables, state: FloatArray, cell: FloatArray, sensors: FloatArray, v: float
+) -> tuple[float, float]:
+    """Rolling and yawing acceleration without their own controls, with what the model misses now.
 
-    Each approaches its bound no faster than a critically damped second-order motion would; in slow flight bank is held
-    from where sideward flight would pass its limit, too.
-
-    Args:
-        state: Law state; the bounds of both are set.
-        cell: The model here.
-        sensors: What is known, order of ``rtsim.command.Sensors``.
+    It misses a gust, or a surface that has run away; what it missed is low-passed.
     """
     settings = tables.settings
-    bank, pitch, p, r = sensors[SENSOR.bank], sensors[SENSOR.pitch], sensors[SENSOR.roll_rate], sensors[SENSOR.yaw_rate]
-    v = sideward_speed(sensors, tables.model.alpha_speed)
+    p, r = sensors[SENSOR.roll_rate], sensors[SENSOR.yaw_rate]
     lateral, pedal = state[LAW.acted_lateral], state[LAW.acted_pedal]
-    roll, yaw, side = model.CELL.roll, model.CELL.yaw, model.CELL.side
-    # What the model's rolling and yawing miss: another pilot's turn, a gust, a surface that has run away.
-    share = settings.period / settings.roll_filter if state[LAW.started] != 0.0 else 0.0
+    roll, yaw = model.CELL.roll, model.CELL.yaw
     rolled = _row(cell, roll, v, p, r) + cell[roll + 4] * pedal
     yawed = _row(cell, yaw, v, p, r) + cell[yaw + 3] * lateral
+    share = settings.period / settings.roll_filter if state[LAW.started] != 0.0 else 0.0
     missed = (p - state[LAW.last_roll_rate]) / settings.period - rolled - cell[roll + 3] * lateral
     state[LAW.roll_bias] += share * (missed - state[LAW.roll_bias])
     missed = (r - state[LAW.last_yaw_rate]) / settings.period - yawed - cell[yaw + 4] * pedal
     state[LAW.yaw_bias] += share * (missed - state[LAW.yaw_bias])
-    rolled += state[LAW.roll_bias]
-    yawed += state[LAW.yaw_bias]
+    return rolled + state[LAW.roll_bias], yawed + state[LAW.yaw_bias]
 
-    _hold_lever(tables, state)
 
+@inner_kernel
+def _drift_allowed(tables: ProtectionTables, sensors: FloatArray, limit: float, v: float, pushed: float) -> float:
+    """Largest sine of the bank to the right that lets a sideward drift come to its limit in time; above 1: any."""
+    settings = tables.settings
+    fades = (abs(sensors[SENSOR.airspeed]) - _DRIFTS_BELOW) / (_DRIFTS_NOT_FROM - _DRIFTS_BELOW)
+    if fades >= 1.0:
+        return 2.0
+    free = max(fades, 0.0) * 4.0
+    return float(((limit - v) / settings.drift_time - pushed) / (GRAVITY * math.cos(sensors[SENSOR.pitch])) + free)
+
+
+@inner_kernel
+def _bound_bank(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    sensors: FloatArray,
+    drift: tuple[float, float, float],
+    rolled: float,
+) -> None:
+    """Bound the lateral stick so that bank stays inside; in slow flight so that a drift does, too.
+
+    Args:
+        drift: Limit of the sideward airspeed, the airspeed [m/s], and its acceleration but for the bank's [m/s^2].
+        rolled: Rolling acceleration without the stick [rad/s^2].
+    """
+    limit, v, pushed = drift
     allowed, reason = turn_allowed(tables, sensors)
     right, left, right_reason, left_reason = allowed, allowed, reason, reason
-    sine, cosine = math.sin(pitch), math.cos(pitch)
-    pushed = _row(cell, side, v, p, r) + cell[side + 3] * lateral + cell[side + 4] * pedal
-    limit = sideward_limit(tables.sideways, sensors[SENSOR.airspeed]) - settings.sideslip_buffer
-    fades = (abs(sensors[SENSOR.airspeed]) - _DRIFTS_BELOW) / (_DRIFTS_NOT_FROM - _DRIFTS_BELOW)
-    if fades < 1.0 and math.isfinite(limit):
-        free = max(fades, 0.0) * 4.0
-        to_right = ((limit - v) / settings.drift_time - pushed) / (GRAVITY * cosine) + free
-        to_left = ((limit + v) / settings.drift_time + pushed) / (GRAVITY * cosine) + free
-        if to_right < math.sin(right):
-            right, right_reason = math.asin(max(to_right, -math.sin(allowed))), REASON_SIDESLIP
-        if to_left < math.sin(left):
-            left, left_reason = math.asin(max(to_left, -math.sin(allowed))), REASON_SIDESLIP
+    to_right = _drift_allowed(tables, sensors, limit, v, pushed)
+    to_left = _drift_allowed(tables, sensors, limit, -v, -pushed)
+    if to_right < math.sin(right):
+        right, right_reason = math.asin(max(to_right, -math.sin(allowed))), REASON_SIDESLIP
+    if to_left < math.sin(left):
+        left, left_reason = math.asin(max(to_left, -math.sin(allowed))), REASON_SIDESLIP
+    power = cell[model.CELL.roll + 3]
+    if power <= 0.1:
+        return
+    f, bank, rolling = tables.settings.bank_frequency, sensors[SENSOR.bank], _bank_rate(sensors)
+    up, down = f * f * (right - bank) - 2.0 * f * rolling, -f * f * (left + bank) - 2.0 * f * rolling
+    state[LAW.lateral_low] = max(min((down - rolled) / power, 1.0), -1.0)
+    state[LAW.lateral_high] = max(min((up - rolled) / power, 1.0), -1.0)
+    state[LAW.lateral_low_reason], state[LAW.lateral_high_reason] = left_reason, right_reason
 
-    f = settings.bank_frequency
-    rolling = p + sine / max(cosine, 0.1) * (sensors[SENSOR.pitch_rate] * math.sin(bank) + r * math.cos(bank))
-    power = cell[roll + 3]
-    if power > 0.1:
-        up, down = f * f * (right - bank) - 2.0 * f * rolling, -f * f * (left + bank) - 2.0 * f * rolling
-        low, high = (down - rolled) / power, (up - rolled) / power
-        state[LAW.lateral_low], state[LAW.lateral_high] = max(min(low, 1.0), -1.0), max(min(high, 1.0), -1.0)
-        state[LAW.lateral_low_reason], state[LAW.lateral_high_reason] = left_reason, right_reason
-        _bound_twist(tables, state, cell, sensors)
 
-    u = sensors[SENSOR.airspeed]
-    effect = cell[side + 2] * cell[yaw + 4]  # pedals turn the nose, and the turn moves the air to the other side
-    if u > _PEDAL_FROM and effect < -0.1 and math.isfinite(limit):
-        f = settings.sideslip_frequency
-        slipping = pushed + GRAVITY * cosine * math.sin(bank)
-        rest = cell[side] * slipping + cell[side + 2] * yawed + GRAVITY * cosine * math.cos(bank) * rolling
-        up, down = f * f * (limit - v) - 2.0 * f * slipping, -f * f * (limit + v) - 2.0 * f * slipping
-        low, high = (up - rest) / effect, (down - rest) / effect
-        state[LAW.pedal_low], state[LAW.pedal_high] = max(min(low, 1.0), -1.0), max(min(high, 1.0), -1.0)
-        state[LAW.pedal_reason] = REASON_SIDESLIP
+@inner_kernel
+def _bank_rate(sensors: FloatArray) -> float:
+    """Rate of the bank angle [rad/s]."""
+    bank, pitch = sensors[SENSOR.bank], sensors[SENSOR.pitch]
+    turning = sensors[SENSOR.pitch_rate] * math.sin(bank) + sensors[SENSOR.yaw_rate] * math.cos(bank)
+    return float(sensors[SENSOR.roll_rate] + math.sin(pitch) / max(math.cos(pitch), 0.1) * turning)
+
+
+@inner_kernel
+def _bound_sideslip(
+    tables: ProtectionTables,
+    state: FloatArray,
+    cell: FloatArray,
+    sensors: FloatArray,
+    drift: tuple[float, float, float],
+    yawed: float,
+) -> None:
+    """Bound the pedals so that sideslip stays inside: they turn the nose, and the turn moves the air to the other side.
+
+    Args:
+        drift: As for ``_bound_bank``.
+        yawed: Yawing acceleration without the pedals [rad/s^2].
+    """
+    limit, v, pushed = drift
+    side = model.CELL.side
+    effect = cell[side + 2] * cell[model.CELL.yaw + 4]
+    if sensors[SENSOR.airspeed] <= _PEDAL_FROM or effect >= -0.1 or not math.isfinite(limit):
+        return
+    f, bank, upright = tables.settings.sideslip_frequency, sensors[SENSOR.bank], math.cos(sensors[SENSOR.pitch])
+    slipping = pushed + GRAVITY * upright * math.sin(bank)
+    rest = cell[side] * slipping + cell[side + 2] * yawed + GRAVITY * upright * math.cos(bank) * _bank_rate(sensors)
+    up, down = f * f * (limit - v) - 2.0 * f * slipping, -f * f * (limit + v) - 2.0 * f * slipping
+    state[LAW.pedal_low] = max(min((up - rest) / effect, 1.0), -1.0)
+    state[LAW.pedal_high] = max(min((down - rest) / effect, 1.0), -1.0)
+    state[LAW.pedal_reason] = REASON_SIDESLIP
+
+
+@inner_kernel
+def limit_sideways(tables: ProtectionTables, state: FloatArray, cell: FloatArray, sensors: FloatArray) -> None:
+    """Bound lateral stick, pedals, and the lever where one side does not answer.
+
+    The stick so that bank and masts stay inside, the pedals so that sideslip does; bank and sideslip approach their
+    bounds no faster than a critically damped second-order motion would.
+
+    Args:
+        state: Law state; the bounds are set.
+        cell: The model here.
+        sensors: What is known, order of ``rtsim.command.Sensors``.
+    """
+    side = model.CELL.side
+    v = sideward_speed(sensors, tables.model.alpha_speed)
+    rolled, yawed = _learn(tables, state, cell, sensors, v)
+    pushed = _row(cell, side, v, sensors[SENSOR.roll_rate], sensors[SENSOR.yaw_rate])
+    pushed += cell[side + 3] * state[LAW.acted_lateral] + cell[side + 4] * state[LAW.acted_pedal]
+    limit = sideward_limit(tables.sideways, sensors[SENSOR.airspeed]) - tables.settings.sideslip_buffer
+    drift = (limit, v, pushed)
+    _hold_lever(tables, state)
+    _bound_bank(tables, state, cell, sensors, drift, rolled)
+    _bound_twist(tables, state, cell, sensors)
+    _bound_sideslip(tables, state, cell, sensors, drift, yawed)
 
 
 @inner_kernel
