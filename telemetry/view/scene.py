@@ -33,8 +33,6 @@ SHOWN_WIND = 0.5
 """Wind that is shown from here on [m/s]."""
 SURFACE_STEP = 0.2
 """Control surfaces are shown in steps of this, so that what hardly moves sends nothing [deg]."""
-FLAPERON_OF_FLAP = ((0.0, 20.0, 40.0, 75.0), (0.0, 12.5, 25.0, 47.0))
-"""Flap settings and the flaperons' droop there [deg], CR-166536."""
 
 _RUNWAY_LENGTH = 20_000.0
 _SNAP = 500.0
@@ -213,7 +211,7 @@ def hub_of(row: FloatArray, side: float) -> list[float]:
 
 def surface_angles(row: FloatArray) -> dict[str, float]:
     """How far each control surface is turned about its hinge [deg]: trailing edge down, or to the right."""
-    droop = float(np.interp(row[COLUMN.flap_deg], *FLAPERON_OF_FLAP))
+    droop = float(np.interp(row[COLUMN.flap_deg], *airframe.FLAPERON_OF_FLAP))
     angles = {"elevator": float(row[COLUMN.elevator_deg])}
     for name, side, _ in SIDES:
         angles[f"flap_{name}"] = float(row[COLUMN.flap_deg])
