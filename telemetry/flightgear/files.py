@@ -79,7 +79,7 @@ def start_command(folder: Path, *, listen: Endpoint, home: HomePosition) -> list
         f"--lon={home.longitude_deg:.6f}",
         f"--altitude={home.altitude_m / FOOT + 100.0:.0f}",
         "--heading=0",
-        "--timeofday=noon",
+        "--start-date-lat=2026:06:21:12:00:00",
         "--disable-real-weather-fetch",
         "--disable-ai-traffic",
     ]
