@@ -17,6 +17,7 @@ from telemetry.view.airframe import Mesh
 CREASE_DEG = 40.0
 """Edges sharper than this are shown as edges [deg]."""
 _SHADED, _TWO_SIDED = 0x10, 0x20
+_AMBIENT = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,9 +66,10 @@ def write_ac3d(objects: Sequence[Object]) -> str:
 
 
 def _material(number: int, paint: tuple[int, int, int, float]) -> str:
-    colour = " ".join(f"{channel / 255:.3f}" for channel in paint[:3])
-    shine = "emis 0 0 0 spec 0.25 0.25 0.25 shi 32"
-    return f'MATERIAL "paint{number}" rgb {colour} amb {colour} {shine} trans {1.0 - paint[3]:.2f}'
+    colour, shade = (" ".join(f"{share * channel / 255:.3f}" for channel in paint[:3]) for share in (1.0, _AMBIENT))
+    glow = shade if paint[3] < 1.0 else "0 0 0"
+    shine = f"emis {glow} spec 0.25 0.25 0.25 shi 32"
+    return f'MATERIAL "paint{number}" rgb {colour} amb {shade} {shine} trans {1.0 - paint[3]:.2f}'
 
 
 def _object(one: Object, materials: dict[tuple[int, int, int, float], int]) -> Iterator[str]:

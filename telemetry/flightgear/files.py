@@ -23,12 +23,17 @@ START_SCRIPT = "start-flightgear.sh"
 """Name of the script that starts FlightGear with it."""
 _PILOT_EYE = (136.0, 12.0, 103.0)
 """SL, BL, WL of the eye in the right seat [in], by eye."""
-_CHASE_VIEW = 2
-_CHASE_SCRIPT = f"""
+_COCKPIT, _OUTSIDE = 0, 1
+_SCRIPT = f"""
+var view_number = "/sim/current-view/view-number";
 setlistener("/sim/signals/fdm-initialized", func {{
-    settimer(func {{ setprop("/sim/current-view/view-number", {_CHASE_VIEW}); }}, 1);
+    settimer(func {{ setprop(view_number, {_OUTSIDE}); }}, 1);
 }});
+setlistener(view_number, func(view) {{
+    setprop("/sim/hud/visibility[1]", view.getValue() == {_COCKPIT});
+}}, 1);
 """
+"""Begins outside; the head-up display is for the cockpit."""
 
 
 def write_aircraft(folder: Path, *, listen: Endpoint, home: HomePosition) -> list[Path]:
@@ -114,27 +119,22 @@ def aircraft_xml() -> str:
     _set(sim, "model/path", f"Aircraft/{AIRCRAFT}/Models/xv15.xml")
     _set(sim, "chase-distance-m", -32.0)
     ahead, right, down = (float(way) for way in body_point(np.array(_PILOT_EYE)))
-    eye = ET.SubElement(sim, "view", n="0")
+    eye = ET.SubElement(sim, "view", n=str(_COCKPIT))
     look = {"x-offset-m": right, "y-offset-m": -down, "z-offset-m": -ahead, "pitch-offset-deg": -4.0}
     for name, value in look.items():
         _set(eye, f"config/{name}", value)
-    _set(ET.SubElement(sim, "hud"), "visibility", True, n="1")
+    _set(ET.SubElement(sim, "view", n=str(_OUTSIDE)), "config/y-offset-m", 5.0)
     nasal = ET.SubElement(root, "nasal")
-    _set(nasal, "rtsim/script", _CHASE_SCRIPT)
+    _set(nasal, "rtsim/script", _SCRIPT)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _set(node: ET.Element, path: str, value: str | float | bool, **attributes: str) -> None:
-    """Set a property below a node, of the type of the value."""
+def _set(node: ET.Element, path: str, value: str | float) -> None:
+    """Set a property below a node."""
     *above, name = path.split("/")
     for step in above:
         found = node.find(step)
         node = found if found is not None else ET.SubElement(node, step)
-    if isinstance(value, str):
-        kind, text = "string", value
-    elif isinstance(value, bool):
-        kind, text = "bool", "true" if value else "false"
-    else:
-        kind, text = "double", f"{value:.4g}"
-    ET.SubElement(node, name, {"type": kind, **attributes}).text = text
+    kind, text = ("string", value) if isinstance(value, str) else ("double", f"{value:.4g}")
+    ET.SubElement(node, name, type=kind).text = text

@@ -68,8 +68,8 @@ def _listener() -> Iterator[Listener]:
 def test_a_listener_sees_the_flight_of_the_log(listener: Listener, tmp_path: Path) -> None:
     said: list[str] = []
     outputs = FlightOutputs(log=tmp_path / "turn.parquet", flightgear=listener.config, on_message=said.append)
-    overrides = Overrides(start="conversion", duration=2.0, turbulence="moderate", lateral_turbulence=True)
-    flight = scenarios.fly("slalom", overrides=overrides, outputs=outputs)
+    overrides = Overrides(duration=2.0, turbulence="moderate", lateral_turbulence=True)
+    flight = scenarios.fly("standard_turn_80_75", overrides=overrides, outputs=outputs)
     assert flight.completed
     assert said == [f"FlightGear: sends to {listener.config.target}."]
     time.sleep(0.2)  # what the process sent last is on its way
