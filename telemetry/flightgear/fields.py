@@ -14,7 +14,7 @@ from rtsim.frame import COLUMN
 from rtsim.units import FOOT, GRAVITY, KNOT, deg
 from telemetry.exchange.globe import HomePosition
 from telemetry.flightgear.packet import OWN_HEIGHT, RUNNING
-from telemetry.view.undercarriage import STANDING_HEIGHT
+from telemetry.view.undercarriage import STANDING_HEIGHT, extended, stroke_used
 
 Values = dict[str, float | Sequence[float]]
 """Numbers of a packet by field."""
@@ -24,11 +24,7 @@ SURFACE_TRAVEL_DEG = 20.0
 """Deflection of elevator, aileron and rudder that counts as 1 [deg]."""
 FLAP_TRAVEL_DEG = 75.0
 """Deflection of the flaps that counts as 1 [deg]."""
-GEAR_NACELLE_DEG = (60.0, 75.0)
-"""The wheels are shown up below the first nacelle angle, down above the second [deg]; no flight knows of it."""
 _POUNDS_PER_GALLON = 6.7
-_FULLY_PRESSED = 2.0
-"""Force on the wheels over the weight that uses the whole stroke: standing, half of it is used."""
 
 
 def packet_values(row: FloatArray, home: HomePosition) -> Values:
@@ -94,11 +90,10 @@ def _motion(row: FloatArray, home: HomePosition) -> Values:
 
 def _machine(row: FloatArray) -> Values:
     """Rotors, fuel and wheels; the left rotor is engine 0."""
-    speed, flow = float(row[COLUMN.rotor_speed_rpm]), 0.5 * float(row[COLUMN.fuel_flow_lb_h]) / _POUNDS_PER_GALLON
-    state = RUNNING if flow > 0.0 else 0
-    load = float(row[COLUMN.weight_on_wheels])
-    up, down = GEAR_NACELLE_DEG
-    extended = min(max((float(row[COLUMN.nacelle_deg]) - up) / (down - up), 0.0), 1.0)
+    speed, burned = float(row[COLUMN.rotor_speed_rpm]), float(row[COLUMN.fuel_flow_lb_h])
+    state, flow = RUNNING if burned > 0.0 else 0, 0.5 * burned / _POUNDS_PER_GALLON
+    pressed = float(row[COLUMN.weight_on_wheels])
+    down = extended(float(row[COLUMN.nacelle_deg]))
     return {
         "num_engines": 2,
         "eng_state": (state, state, 0, 0),
@@ -107,9 +102,9 @@ def _machine(row: FloatArray) -> Values:
         "num_tanks": 1,
         "fuel_quantity": (float(row[COLUMN.fuel_lb]) / _POUNDS_PER_GALLON, 0.0, 0.0, 0.0),
         "num_wheels": 3,
-        "wow": (int(load > 0.0),) * 3,
-        "gear_pos": (extended,) * 3,
-        "gear_compression": (min(load / _FULLY_PRESSED, 1.0),) * 3,
+        "wow": (int(pressed > 0.0),) * 3,
+        "gear_pos": (down,) * 3,
+        "gear_compression": (stroke_used(pressed),) * 3,
         "speedbrake": float(row[COLUMN.nacelle_deg]) / NACELLE_FULL_DEG,
     }
 

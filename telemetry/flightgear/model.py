@@ -18,7 +18,7 @@ from telemetry.flightgear.ac3d import Object, model_axes
 from telemetry.flightgear.fields import FLAP_TRAVEL_DEG, NACELLE_FULL_DEG, SURFACE_TRAVEL_DEG
 from telemetry.view import airframe
 from telemetry.view.airframe import Mesh
-from telemetry.view.undercarriage import Leg, fairing, main_leg, nose_leg
+from telemetry.view.undercarriage import Leg, fairing, legs
 
 SIDES = (("left", -1.0, 0), ("right", 1.0, 1))
 """Name, sign of y and number of the engine of each side."""
@@ -59,7 +59,7 @@ def objects() -> list[Object]:
         Object("fairings", airframe.merge([fairing(side) for _, side, _ in SIDES])),
     ]
     surfaces = [Object(name, _at(surface.mesh, surface.place)) for name, surface in _surfaces().items()]
-    legs = [
+    gear = [
         Object(
             f"gear_{name}",
             parts=(
@@ -67,16 +67,16 @@ def objects() -> list[Object]:
                 Object(f"wheels_{name}", _at(leg.wheels, leg.place)),
             ),
         )
-        for name, leg in _legs().items()
+        for name, leg in legs().items()
     ]
-    return [*body, *surfaces, *legs, *(_nacelle(name, side) for name, side, _ in SIDES)]
+    return [*body, *surfaces, *gear, *(_nacelle(name, side) for name, side, _ in SIDES)]
 
 
 def movements() -> list[Movement]:
     """What moves on it."""
     moves = [_hinge("elevator", f"{_SURFACE}/elevator-pos-norm", SURFACE_TRAVEL_DEG)]
     droop = [(flap / FLAP_TRAVEL_DEG, angle) for flap, angle in zip(*airframe.FLAPERON_OF_FLAP, strict=True)]
-    for number, (name, leg) in enumerate(_legs().items()):
+    for number, (name, leg) in enumerate(legs().items()):
         moves += _leg_moves(name, leg, f"gear/gear[{number}]")
     for name, side, engine in SIDES:
         moves += [
@@ -158,11 +158,6 @@ def _surfaces() -> dict[str, airframe.Surface]:
             f"rudder_{name}": airframe.rudder(side),
         }
     return surfaces
-
-
-def _legs() -> dict[str, Leg]:
-    """The legs in the order of FlightGear's wheels."""
-    return {"nose": nose_leg()} | {name: main_leg(side) for name, side, _ in SIDES}
 
 
 def _leg_moves(name: str, leg: Leg, wheel: str) -> list[Movement]:

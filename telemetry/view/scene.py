@@ -10,7 +10,7 @@ import rerun as rr
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
-from telemetry.view import airframe
+from telemetry.view import airframe, undercarriage
 from telemetry.view.colours import AMBER, CYAN, LEFT_ROTOR, RIGHT_ROTOR, TEXT, TRAIL, WIND
 from telemetry.view.strokes import LineArt
 
@@ -55,8 +55,10 @@ class Scene:
         self._static("world/chase", rr.ViewCoordinates.FRD)
         for name, mesh in (("body", airframe.fuselage()), ("wing", airframe.wing()), ("tail", airframe.tail())):
             self._static(f"world/aircraft/{name}", _mesh(mesh))
+        self._legs = undercarriage.legs()
         self._surfaces = {"elevator": airframe.elevator()}
         for name, side, colour in SIDES:
+            self._static(f"world/aircraft/fairing_{name}", _mesh(undercarriage.fairing(side)))
             self._log_static_rotor(f"world/aircraft/nacelle_{name}", side, colour)
             self._surfaces[f"flap_{name}"] = airframe.flap(side)
             self._surfaces[f"flaperon_{name}"] = airframe.flaperon(side)
@@ -85,6 +87,7 @@ class Scene:
             self._log(f"{path}/hub", rr.Transform3D(translation=[airframe.MAST_LENGTH, 0.0, 0.0], quaternion=hub))
             self._log(f"{path}/hub/blades", rr.Transform3D(quaternion=_quaternion(_about_x(side * azimuth))))
         self._move_surfaces(row)
+        self._move_legs(row)
         self._move_ground(row, position, departure=trail)
         self._log(
             "world/height",
@@ -106,6 +109,25 @@ class Scene:
                 surface = self._surfaces[name]
                 turned = _quaternion(_about(surface.axis, math.radians(shown)))
                 self._log(f"world/aircraft/{name}", rr.Transform3D(translation=surface.place, quaternion=turned))
+
+    def _move_legs(self, row: FloatArray) -> None:
+        """Fold the legs, which are not there while they are up, and press their wheels."""
+        down = undercarriage.extended(float(row[COLUMN.nacelle_deg]))
+        used = round(undercarriage.stroke_used(float(row[COLUMN.weight_on_wheels])), 2)
+        if not self._changed("legs", down, used):
+            return
+        for name, leg in self._legs.items():
+            path = f"world/aircraft/leg_{name}"
+            if not down:
+                self._log(path, rr.Clear(recursive=True))
+                self._kept.pop(path, None)
+                continue
+            if self._changed(path):
+                self._log(f"{path}/strut", _mesh(leg.strut))
+                self._log(f"{path}/wheels", _mesh(leg.wheels))
+            folded = _quaternion(_about_y(math.radians(leg.folded_deg * (1.0 - down))))
+            self._log(path, rr.Transform3D(translation=leg.place, quaternion=folded))
+            self._log(f"{path}/wheels", rr.Transform3D(translation=[0.0, 0.0, -used * leg.stroke]))
 
     def _move_ground(self, row: FloatArray, position: list[float], *, departure: bool) -> None:
         """Take plain, compass rose and wind arrow along; lay the runway along the heading of the departure."""

@@ -22,7 +22,28 @@ NOSE_STROKE, MAIN_STROKE = 14.5 * INCH, 13.5 * INCH
 """Strokes of the legs [m]."""
 STANDING_HEIGHT = 1.944
 """Centre of gravity above the ground where the aircraft stands, half of the strokes used [m]."""
+GEAR_NACELLE_DEG = (60.0, 75.0)
+"""The legs are shown up below the first nacelle angle, down above the second [deg]."""
 _FOLDED_DEG = 95.0
+
+
+def extended(nacelle_deg: float) -> float:
+    """How far the legs are shown down, 0 to 1: no flight knows of it, and landings need upright nacelles.
+
+    Args:
+        nacelle_deg: Nacelle angle [deg].
+    """
+    up, down = GEAR_NACELLE_DEG
+    return min(max((nacelle_deg - up) / (down - up), 0.0), 1.0)
+
+
+def stroke_used(weight_on_wheels: float) -> float:
+    """How much of the strokes is used, 0 to 1: half of them where the aircraft stands.
+
+    Args:
+        weight_on_wheels: Force of the ground over the weight.
+    """
+    return min(0.5 * weight_on_wheels, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +60,11 @@ class Leg:
     """How far it turns about +y to be up [deg]."""
     stroke: float
     """How far the wheels go up [m]."""
+
+
+def legs() -> dict[str, Leg]:
+    """Every leg by its name, in FlightGear's order of wheels."""
+    return {"nose": nose_leg(), "left": main_leg(-1.0), "right": main_leg(1.0)}
 
 
 def nose_leg() -> Leg:
