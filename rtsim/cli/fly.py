@@ -260,6 +260,8 @@ def fly_command(
         )
         refuse_unpaced(chosen, paced=not math.isinf(pace))
         mavlink_config(link, chosen)  # mistakes are told before anything starts
+    if home is not None and link is None and window is None:
+        raise InputError("places nothing", key="--origin", value=origin, mend="add --flightgear or --mavlink")
     view = _view_options(headless=headless, record=record, layout=layout)
     flight, first_frame_s, code = _fly(
         chosen,

@@ -259,6 +259,7 @@ def test_the_default_address_is_declared_alike() -> None:
         (["--flightgear", "127.0.0.1:99999"], "is no UDP address"),
         (["--flightgear=no such host"], "the name cannot be resolved"),
         (["--origin", "somewhere"], "is no place on the globe"),
+        (["--origin", "10,20"], "add --flightgear or --mavlink"),
     ],
 )
 def test_mistakes_are_one_sentence(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
