@@ -77,7 +77,8 @@ class Scene:
         position = place_of(row)
         heading = _about_z(math.radians(row[COLUMN.heading_deg]))
         self._log("world/chase", rr.Transform3D(translation=position, quaternion=_quaternion(heading)))
-        self._log("world/aircraft", rr.Transform3D(translation=position, quaternion=_quaternion(attitude_of(row))))
+        centre = [*position[:2], position[2] - undercarriage.STANDING_HEIGHT]  # altitude is 0 standing on the wheels
+        self._log("world/aircraft", rr.Transform3D(translation=centre, quaternion=_quaternion(attitude_of(row))))
         azimuth = 2.0 * math.pi * ((SHOWN_TURNS_PER_SECOND * time_s) % 1.0)
         for name, side, _ in SIDES:
             path = f"world/aircraft/nacelle_{name}"

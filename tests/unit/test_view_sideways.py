@@ -200,7 +200,8 @@ def test_wheels_are_down_to_land_pressed_on_the_ground_and_gone_in_cruise() -> N
     (wheels,) = [archetype for path, archetype in recording.logged if path == "world/aircraft/leg_left/wheels"]
     up = wheels.translation.as_arrow_array().to_pylist()[0]  # type: ignore[attr-defined]
     assert up == pytest.approx([0.0, 0.0, -0.5 * undercarriage.MAIN_STROKE])
-    recording.take()
+    centre = recording.take()["world/aircraft"].translation.as_arrow_array().to_pylist()[0]  # type: ignore[attr-defined]
+    assert centre == pytest.approx([0.0, 0.0, -undercarriage.STANDING_HEIGHT])  # the ground is where the wheels stand
     for nacelle, kinds in ((65.0, rr.Transform3D), (10.0, rr.Clear), (70.0, rr.Transform3D)):
         shown.update(row_of(nacelle_deg=nacelle))
         assert isinstance(recording.take()["world/aircraft/leg_nose"], kinds)
