@@ -145,6 +145,24 @@ def fly_command(
             rich_help_panel="Outputs",
         ),
     ] = False,
+    flightgear: Annotated[
+        str | None,
+        typer.Option(
+            metavar="[HOST:PORT]",
+            help="Show the flight in FlightGear; 127.0.0.1:5510 where no address follows.",
+            show_default="it is not shown there",
+            rich_help_panel="Outputs",
+        ),
+    ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LAT,LON[,M]",
+            help="Where the flight begins on the globe [deg], and the ground's height there [m].",
+            show_default="MAVLink: Crows Landing; FlightGear: Keflavik's runway",
+            rich_help_panel="Outputs",
+        ),
+    ] = None,
     mavlink: Annotated[
         list[str] | None,
         typer.Option(
@@ -203,6 +221,7 @@ def fly_command(
     from rtsim.units import deg, kt
     from scenarios.files.options import Overrides, chosen_scenario
     from scenarios.flight.preflight import preflight_problems
+    from telemetry.exchange.globe import HomePosition
 
     OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
@@ -219,6 +238,12 @@ def fly_command(
     chosen = chosen_scenario(scenario, overrides)
     for problem in preflight_problems(chosen):
         raise problem
+    home = HomePosition.parse(origin) if origin is not None else None
+    window = None
+    if flightgear is not None:
+        from scenarios.flight.window_options import window_config
+
+        window = window_config(flightgear, home=home, paced=not math.isinf(pace))
     link = None
     if mavlink or mavlink_bind or chosen.options.pilot == HAND_PILOT:
         from scenarios.flight.mavlink_options import MavlinkOptions, mavlink_config, refuse_unpaced
@@ -231,15 +256,18 @@ def fly_command(
             parameter_file=mavlink_parameters,
             stick_map=stick_map,
             autopilot=autopilot,
+            home=home or HomePosition(),
         )
         refuse_unpaced(chosen, paced=not math.isinf(pace))
         mavlink_config(link, chosen)  # mistakes are told before anything starts
+    if home is not None and link is None and window is None:
+        raise InputError("places nothing", key="--origin", value=origin, mend="add --flightgear or --mavlink")
     view = _view_options(headless=headless, record=record, layout=layout)
     flight, first_frame_s, code = _fly(
         chosen,
         speed=pace,
         view=view,
-        outputs={"log": log, "overwrite": overwrite, "mavlink": link},
+        outputs={"log": log, "overwrite": overwrite, "mavlink": link, "flightgear": window},
         policy=overrun_policy,
     )
     if json:

@@ -49,8 +49,8 @@ def joystick_command(
 
     Start the aircraft first, in another terminal: rtsim fly manual_flight --pilot mavlink
     """
+    from telemetry.exchange.endpoint import Endpoint
     from telemetry.joystick.sender import Sender
-    from telemetry.mavlink.config import Endpoint
 
     if list_devices:
         _list(json=json)

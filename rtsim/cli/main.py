@@ -18,6 +18,7 @@ from rtsim import __version__
 from rtsim.cli import stopping
 from rtsim.cli.build_text import build_notice
 from rtsim.cli.compile_text import compile_notice
+from rtsim.cli.options import with_values
 from rtsim.cli.output import machine_output
 from rtsim.cli.surroundings import leave_settings_of_others
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED, RtsimError
@@ -44,6 +45,7 @@ COMMAND_MODULES = (
     "reproduce",
     "validate",
     "joystick",
+    "flightgear",
 )
 """Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
 
@@ -184,9 +186,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
 def _invoke(arguments: Sequence[str] | None) -> int:
     command = typer.main.get_command(build_app())
     try:
-        words = sys.argv[1:] if arguments is None else arguments
+        words = with_values(sys.argv[1:] if arguments is None else arguments)
         with compile_notice(), build_notice(), machine_output() if "--json" in words else nullcontext():
-            result = command.main(args=arguments, prog_name="rtsim", standalone_mode=False)
+            result = command.main(args=words, prog_name="rtsim", standalone_mode=False)
     except SystemExit as end:
         # The parser turns a broken pipe into exit 1, which is our code for a failed expectation.
         if isinstance(end.__context__, BrokenPipeError):

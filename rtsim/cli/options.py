@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -14,7 +14,24 @@ from rtsim.loop.options import Option, declared
 
 PANELS = ("Who flies what", "Start", "Air", "Loop", "Outputs", "MAVLink")
 """Headings of ``rtsim fly --help``, in order."""
+OPTIONAL_VALUES = {"--flightgear": "127.0.0.1:5510"}
+"""Options whose value may be left out, and what holds then; a value after a space has a colon, as an address has."""
 Command = TypeVar("Command", bound=Callable[..., None])
+
+
+def with_values(words: Sequence[str]) -> list[str]:
+    """A command line in which every option that stands without its value has it.
+
+    Args:
+        words: The words after ``rtsim``.
+    """
+    words = list(words)
+    end = words.index("--") if "--" in words else len(words)
+    for place, word in enumerate(words[:end]):
+        following = words[place + 1] if place + 1 < end else "-"
+        if word in OPTIONAL_VALUES and (following.startswith("-") or ":" not in following):
+            words[place] = f"{word}={OPTIONAL_VALUES[word]}"
+    return words
 
 
 def takes_options(*names: str, own: str = "the scenario's") -> Callable[[Command], Command]:

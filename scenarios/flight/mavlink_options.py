@@ -17,8 +17,9 @@ from rtsim.loop.aircraft import database_of
 from rtsim.protection.limits import load_limits
 from rtsim.sticks.settings import StickSettings
 from rtsim.units import INCH_POUND, deg, to_deg, to_kt, to_rpm
+from telemetry.exchange.globe import HomePosition
 from telemetry.joystick.stick_map import VehicleMap, load_vehicle_map
-from telemetry.mavlink.config import HomePosition, MavlinkConfig, Ratings, endpoints
+from telemetry.mavlink.config import MavlinkConfig, Ratings, endpoints
 from telemetry.mavlink.parameters import NOT_STORED, ParameterStore
 
 if TYPE_CHECKING:

@@ -43,6 +43,8 @@ from telemetry.log.place import check_log
 from telemetry.view.recording import check_recording
 
 if TYPE_CHECKING:
+    from telemetry.flightgear.config import WindowConfig
+    from telemetry.flightgear.link import FlightGearLink
     from telemetry.log.recorder import Recorder
     from telemetry.mavlink.link import MavlinkLink
     from telemetry.view.options import ViewOptions
@@ -83,6 +85,8 @@ class FlightOutputs:
     """Rerun view and recording; None shows nothing."""
     mavlink: MavlinkOptions | None = None
     """Ground stations; None talks no MAVLink, unless the pilot is behind it."""
+    flightgear: WindowConfig | None = None
+    """FlightGear as a window; None shows nothing there. Needs a paced flight."""
     on_message: Callable[[str], None] | None = None
     """Told what the view has to say, one sentence at a time."""
     on_rows: Callable[[FloatArray], None] | None = None
@@ -132,11 +136,13 @@ def fly(
     live = speed != "max"
     control = control if control is not None else FlightControl()
     link: MavlinkLink | None = None
+    window: FlightGearLink | None = None
     log: Recorder | None = None
     # The view needs a second to start, in its own process, while this one loads the aircraft.
     view = _start_view(scenario, outputs)
     try:
         link = _start_mavlink(scenario, outputs, live=live)
+        window = _start_window(outputs, live=live)
         simulation = Simulation(flight_setup(scenario))
         waits = flown_by_hand(scenario.options.pilot)
         hands = Hands(link, simulation, control=control, waits=waits) if link is not None else None
@@ -153,7 +159,7 @@ def fly(
         sinks = FlightSinks(
             log=log,
             view=view,
-            mirror=link,
+            mirrors=[mirror for mirror in (link, window) if mirror is not None],
             watch_corridor=scenario.options.protection != "off",
             limits=_limit_watch(scenario, simulation.dt),
             on_rows=outputs.on_rows,
@@ -180,10 +186,10 @@ def fly(
         if hands is not None:
             record = dataclasses.replace(record, mavlink=hands.summary())
     except BaseException:
-        _close_mavlink(link)
+        _close_links(link, window)
         _close(log, view, None, outputs.on_message)
         raise
-    link_failure = _close_mavlink(link)
+    link_failure = _close_links(link, window)
     return dataclasses.replace(record, failure=_close(log, view, record, outputs.on_message) or link_failure)
 
 
@@ -261,11 +267,28 @@ def _event_listener(outputs: FlightOutputs, link: MavlinkLink | None) -> Callabl
     return tell
 
 
-def _close_mavlink(link: MavlinkLink | None) -> OutputError | None:
+def _close_links(link: MavlinkLink | None, window: FlightGearLink | None) -> OutputError | None:
+    """Close what was sent to whatever happened; gives why MAVLink broke, where it did."""
+    if window is not None:
+        window.close()
     if link is None:
         return None
     link.close()
     return link.failure
+
+
+def _start_window(outputs: FlightOutputs, *, live: bool) -> FlightGearLink | None:
+    """Start the process that sends to FlightGear."""
+    config = outputs.flightgear
+    if config is None:
+        return None
+    from scenarios.flight.window_options import refuse_unpaced_window
+    from telemetry.flightgear.link import FlightGearLink
+
+    refuse_unpaced_window(paced=live)
+    if outputs.on_message is not None:
+        outputs.on_message(f"FlightGear: sends to {config.target}.")
+    return FlightGearLink(config, on_message=outputs.on_message)
 
 
 def _start_log(scenario: Scenario, simulation: Simulation, outputs: FlightOutputs, *, live: bool) -> Recorder | None:

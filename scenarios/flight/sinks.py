@@ -204,7 +204,7 @@ class FlightSinks:
         *,
         log: RowLog | None = None,
         view: RowView | None = None,
-        mirror: RowMirror | None = None,
+        mirrors: Sequence[RowMirror] = (),
         watch_corridor: bool = True,
         limits: Callable[[Callable[[LogEvent], None]], LimitWatch] | None = None,
         on_rows: Callable[[FloatArray], None] | None = None,
@@ -215,7 +215,7 @@ class FlightSinks:
         Args:
             log: Keeps every row and event.
             view: Shows what it can.
-            mirror: Shown every row of a paced flight beside the view (MAVLink).
+            mirrors: Shown every row of a paced flight beside the view (MAVLink, FlightGear).
             watch_corridor: Make events of changes of the corridor level.
             limits: Makes what watches limits and protection from whom it tells; None: nobody watches.
             on_rows: Told the last row flown (progress and status lines); must be quick.
@@ -226,7 +226,7 @@ class FlightSinks:
         self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
         self._view_told = 0
         self._lateness_us = 0.0
-        self._mirror = mirror
+        self._mirrors = mirrors
         self._watch_corridor = watch_corridor
         self._limits = limits(self.event) if limits is not None else None
         self._level = 0.0
@@ -240,8 +240,8 @@ class FlightSinks:
         if self._view is not None:
             timing[_DROPPED] = self._view.dropped
             self._view.push(row, timing)
-        if self._mirror is not None:
-            self._mirror.push(row, timing)
+        for mirror in self._mirrors:
+            mirror.push(row, timing)
 
     def record(self, row: FloatArray, timing: FloatArray) -> None:
         """Keep a row."""

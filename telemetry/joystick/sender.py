@@ -13,8 +13,8 @@ from typing import Any
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.errors import InputError
+from telemetry.exchange.endpoint import Endpoint
 from telemetry.joystick.mapping import Controls
-from telemetry.mavlink.config import Endpoint
 from telemetry.mavlink.framing import LARGEST_DATAGRAM, decode, frames
 
 SYSTEM_ID, COMPONENT_ID = 255, 190

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ipaddress
 import json
-import socket
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -12,67 +11,13 @@ from typing import Any, Literal
 
 from rtsim.errors import InputError
 from rtsim.outside import read_bytes
+from telemetry.exchange.endpoint import Endpoint
+from telemetry.exchange.globe import HomePosition
 
 DEFAULT_TARGET = "127.0.0.1:14550"
 """Where ground stations listen by convention."""
 WHITELIST = tuple(range(240, 256))
 """System ids of ground stations (QGroundControl, MAVProxy 255, MAVSDK 245, APM Planner 252); no vehicle uses them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Endpoint:
-    """An IPv4 address and a UDP port."""
-
-    host: str
-    """Dotted address."""
-    port: int
-    """UDP port."""
-
-    @classmethod
-    def parse(cls, text: str, *, key: str = "--mavlink") -> Endpoint:
-        """Read ``HOST:PORT``; a name is resolved now.
-
-        Args:
-            text: What the user wrote; ``HOST`` alone means port 14550.
-            key: The option it was given to, for the message.
-
-        Raises:
-            InputError: It is not an address, or the name is unknown.
-        """
-        host, colon, port_text = text.strip().rpartition(":")
-        if not colon:
-            host, port_text = text.strip(), "14550"
-        allowed = "HOST:PORT with an IPv4 address or a name, port 1 to 65535"
-        mend = f"write for example {DEFAULT_TARGET}"
-        if not port_text.isascii() or not port_text.isdigit() or not 1 <= int(port_text) <= 65535 or not host:
-            raise InputError("is no UDP address", key=key, value=text, allowed=allowed, mend=mend)
-        try:
-            found = socket.getaddrinfo(host, int(port_text), socket.AF_INET, socket.SOCK_DGRAM)
-        except (OSError, UnicodeError):
-            raise InputError("the name cannot be resolved", key=key, value=text, allowed=allowed, mend=mend) from None
-        return cls(str(found[0][4][0]), int(port_text))
-
-    @property
-    def loopback(self) -> bool:
-        """Whether it stays on this machine."""
-        return ipaddress.ip_address(self.host).is_loopback
-
-    def __str__(self) -> str:
-        return f"{self.host}:{self.port}"
-
-
-@dataclass(frozen=True, slots=True)
-class HomePosition:
-    """Where the flight begins on the globe: the XV-15 flew at NASA's Crows Landing field."""
-
-    latitude_deg: float = 37.4080
-    """North positive [deg]."""
-    longitude_deg: float = -121.1090
-    """East positive [deg]."""
-    altitude_m: float = 0.0
-    """Ground elevation above mean sea level [m]; 0 because the model flies in sea-level air at every height."""
-    heading_deg: float = 0.0
-    """True heading at the start [deg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +58,7 @@ class MavlinkConfig:
     """Frame rate of the flight."""
     ratings: Ratings = Ratings()
     """What torque and rotor speed are shares of."""
-    home: HomePosition = HomePosition()
+    home: HomePosition = field(default_factory=HomePosition)
     """Start of the flight on the globe."""
     aids: Mapping[str, bool] = field(default_factory=dict)
     """Pilot aids of the flight and whether each is on at the start, in the order of ``Feedback.aids``."""

@@ -9,12 +9,10 @@ from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import TIMING_SIGNALS
 from rtsim.units import KNOT, deg
-from telemetry.mavlink.config import HomePosition
+from telemetry.exchange.globe import HomePosition
 from telemetry.mavlink.fields import real, whole, wrapped
 from telemetry.mavlink.state import INPUT_LIVE, PILOT_EXTERNAL, PILOT_HOLD, FlightState
 
-METRES_PER_DEGREE = 6_371_000.0 * math.pi / 180.0
-"""Length of a degree of latitude on a sphere [m]."""
 _TIMING = {signal.name: place for place, signal in enumerate(TIMING_SIGNALS)}
 
 
@@ -44,7 +42,6 @@ class FlightMessages:
             state: The flight, kept up to date by the vehicle.
         """
         self._home, self._state = home, state
-        self._metres_per_degree_east = METRES_PER_DEGREE * max(math.cos(deg(home.latitude_deg)), 0.01)
 
     def attitude(self) -> list[Any]:
         """ATTITUDE."""
@@ -90,9 +87,7 @@ class FlightMessages:
     def _latitude_longitude(self) -> tuple[int, int]:
         """Position in 1e-7 degrees."""
         value = self._state.value
-        latitude = self._home.latitude_deg + value("north_m") / METRES_PER_DEGREE
-        longitude = self._home.longitude_deg + value("east_m") / self._metres_per_degree_east
-        longitude = (longitude + 180.0) % 360.0 - 180.0
+        latitude, longitude = self._home.place(value("north_m"), value("east_m"))
         return whole(latitude * 1e7, -900_000_000, 900_000_000), whole(longitude * 1e7, -1_800_000_000, 1_800_000_000)
 
     def _altitude_amsl(self) -> float:

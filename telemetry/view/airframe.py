@@ -25,6 +25,8 @@ PIVOT = np.array([(301.2 - 300.0) * INCH, 193.0 * INCH, (81.65 - 100.0) * INCH])
 """Right conversion axis in the body frame [m]: SL 300, BL 193, WL 100."""
 BLADE_COUNT = 3
 """Blades of one rotor."""
+FLAPERON_OF_FLAP = ((0.0, 20.0, 40.0, 75.0), (0.0, 12.5, 25.0, 47.0))
+"""Flap settings and the flaperons' droop there [deg], CR-166536."""
 
 WHITE, BLUE, GLASS, GREY, DARK = (232, 235, 238), (38, 84, 160), (30, 42, 58), (176, 182, 190), (70, 76, 84)
 Colour = tuple[int, int, int]
@@ -102,7 +104,7 @@ def fuselage() -> Mesh:
         sections[index, :, 0] = station
         sections[index, :, 1] = width * rounded[:, 0]
         sections[index, :, 2] = centre + height * rounded[:, 1]
-    mesh = loft(_stations_to_body(sections), WHITE)
+    mesh = loft(body_point(sections), WHITE)
     level = np.tile(np.sin(angles), len(dense))
     along = np.repeat(dense, len(angles))
     colours = mesh.colours
@@ -120,17 +122,17 @@ def wing() -> Mesh:
     half = [(_ROOT, whole), *((span, _front(whole)) for span in _CUTS), (193.0, whole)]
     sections = [_wing_section(-span, outline) for span, outline in half[::-1]]
     sections += [_wing_section(span, outline) for span, outline in half]
-    return loft(_stations_to_body(np.stack(sections)), WHITE)
+    return loft(body_point(np.stack(sections)), WHITE)
 
 
 def tail() -> Mesh:
     """Horizontal tail with its two fins, cut out for elevator and rudders."""
     front = _front(_airfoil(_TAIL_CHORD, 0.15, 20), _TAIL_CUT)
-    parts = [loft(_stations_to_body(np.stack([_tail_section(span, front) for span in (-77.0, 0.0, 77.0)])), WHITE)]
+    parts = [loft(body_point(np.stack([_tail_section(span, front) for span in (-77.0, 0.0, 77.0)])), WHITE)]
     for side in (-1.0, 1.0):
         fin = [_fin_section(side, level) for level in _FIN_LEVELS[:2]]
         fin += [_fin_section(side, level, part=_front) for level in _FIN_LEVELS[1:]]
-        parts.append(loft(_stations_to_body(np.stack(fin)), BLUE))
+        parts.append(loft(body_point(np.stack(fin)), BLUE))
     return merge(parts)
 
 
@@ -245,6 +247,16 @@ def disc(colour: Colour) -> Mesh:
     return Mesh(vertices, triangles.astype(np.uint32), normals, colours)
 
 
+def body_point(stations: FloatArray) -> FloatArray:
+    """Body axes about the centre of gravity SL 301.2, WL 81.65 [m].
+
+    Args:
+        stations: SL, BL, WL in the last axis [in].
+    """
+    sl, bl, wl = stations[..., 0], stations[..., 1], stations[..., 2]
+    return np.stack([(301.2 - sl) * INCH, bl * INCH, (81.65 - wl) * INCH], -1)
+
+
 def circle(points: int) -> FloatArray:
     """The rim of a rotor disc in the hub frame, closed, shape (points + 1, 3) [m].
 
@@ -308,19 +320,13 @@ def _wing_surface(side: float, inner: float, outer: float) -> Surface:
 
 def _surface(sections: FloatArray, hinge: list[FloatArray], colour: Colour) -> Surface:
     """What is lofted through sections [in], turning about the line from the first point of the hinge to the second."""
-    first, second = (_stations_to_body(point) for point in hinge)
+    first, second = (body_point(point) for point in hinge)
     axis = (second - first) / np.linalg.norm(second - first)
-    return Surface(loft(_stations_to_body(sections) - first, colour), first, axis)
+    return Surface(loft(body_point(sections) - first, colour), first, axis)
 
 
 def _power(value: FloatArray, exponent: float) -> FloatArray:
     return np.sign(value) * np.abs(value) ** exponent
-
-
-def _stations_to_body(stations: FloatArray) -> FloatArray:
-    """SL, BL, WL [in] to body axes about the centre of gravity SL 301.2, WL 81.65 [m]."""
-    sl, bl, wl = stations[..., 0], stations[..., 1], stations[..., 2]
-    return np.stack([(301.2 - sl) * INCH, bl * INCH, (81.65 - wl) * INCH], -1)
 
 
 def _airfoil(chord: float, thickness: float, points: int) -> FloatArray:

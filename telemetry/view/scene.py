@@ -10,7 +10,7 @@ import rerun as rr
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
-from telemetry.view import airframe
+from telemetry.view import airframe, undercarriage
 from telemetry.view.colours import AMBER, CYAN, LEFT_ROTOR, RIGHT_ROTOR, TEXT, TRAIL, WIND
 from telemetry.view.strokes import LineArt
 
@@ -33,8 +33,6 @@ SHOWN_WIND = 0.5
 """Wind that is shown from here on [m/s]."""
 SURFACE_STEP = 0.2
 """Control surfaces are shown in steps of this, so that what hardly moves sends nothing [deg]."""
-FLAPERON_OF_FLAP = ((0.0, 20.0, 40.0, 75.0), (0.0, 12.5, 25.0, 47.0))
-"""Flap settings and the flaperons' droop there [deg], CR-166536."""
 
 _RUNWAY_LENGTH = 20_000.0
 _SNAP = 500.0
@@ -57,8 +55,10 @@ class Scene:
         self._static("world/chase", rr.ViewCoordinates.FRD)
         for name, mesh in (("body", airframe.fuselage()), ("wing", airframe.wing()), ("tail", airframe.tail())):
             self._static(f"world/aircraft/{name}", _mesh(mesh))
+        self._legs = undercarriage.legs()
         self._surfaces = {"elevator": airframe.elevator()}
         for name, side, colour in SIDES:
+            self._static(f"world/aircraft/fairing_{name}", _mesh(undercarriage.fairing(side)))
             self._log_static_rotor(f"world/aircraft/nacelle_{name}", side, colour)
             self._surfaces[f"flap_{name}"] = airframe.flap(side)
             self._surfaces[f"flaperon_{name}"] = airframe.flaperon(side)
@@ -77,7 +77,8 @@ class Scene:
         position = place_of(row)
         heading = _about_z(math.radians(row[COLUMN.heading_deg]))
         self._log("world/chase", rr.Transform3D(translation=position, quaternion=_quaternion(heading)))
-        self._log("world/aircraft", rr.Transform3D(translation=position, quaternion=_quaternion(attitude_of(row))))
+        centre = [*position[:2], position[2] - undercarriage.STANDING_HEIGHT]  # altitude is 0 standing on the wheels
+        self._log("world/aircraft", rr.Transform3D(translation=centre, quaternion=_quaternion(attitude_of(row))))
         azimuth = 2.0 * math.pi * ((SHOWN_TURNS_PER_SECOND * time_s) % 1.0)
         for name, side, _ in SIDES:
             path = f"world/aircraft/nacelle_{name}"
@@ -87,6 +88,7 @@ class Scene:
             self._log(f"{path}/hub", rr.Transform3D(translation=[airframe.MAST_LENGTH, 0.0, 0.0], quaternion=hub))
             self._log(f"{path}/hub/blades", rr.Transform3D(quaternion=_quaternion(_about_x(side * azimuth))))
         self._move_surfaces(row)
+        self._move_legs(row)
         self._move_ground(row, position, departure=trail)
         self._log(
             "world/height",
@@ -108,6 +110,25 @@ class Scene:
                 surface = self._surfaces[name]
                 turned = _quaternion(_about(surface.axis, math.radians(shown)))
                 self._log(f"world/aircraft/{name}", rr.Transform3D(translation=surface.place, quaternion=turned))
+
+    def _move_legs(self, row: FloatArray) -> None:
+        """Fold the legs, which are not there while they are up, and press their wheels."""
+        down = undercarriage.extended(float(row[COLUMN.nacelle_deg]))
+        used = round(undercarriage.stroke_used(float(row[COLUMN.weight_on_wheels])), 2)
+        if not self._changed("legs", down, used):
+            return
+        for name, leg in self._legs.items():
+            path = f"world/aircraft/leg_{name}"
+            if not down:
+                self._log(path, rr.Clear(recursive=True))
+                self._kept.pop(path, None)
+                continue
+            if self._changed(path):
+                self._log(f"{path}/strut", _mesh(leg.strut))
+                self._log(f"{path}/wheels", _mesh(leg.wheels))
+            folded = _quaternion(_about_y(math.radians(leg.folded_deg * (1.0 - down))))
+            self._log(path, rr.Transform3D(translation=leg.place, quaternion=folded))
+            self._log(f"{path}/wheels", rr.Transform3D(translation=[0.0, 0.0, -used * leg.stroke]))
 
     def _move_ground(self, row: FloatArray, position: list[float], *, departure: bool) -> None:
         """Take plain, compass rose and wind arrow along; lay the runway along the heading of the departure."""
@@ -213,7 +234,7 @@ def hub_of(row: FloatArray, side: float) -> list[float]:
 
 def surface_angles(row: FloatArray) -> dict[str, float]:
     """How far each control surface is turned about its hinge [deg]: trailing edge down, or to the right."""
-    droop = float(np.interp(row[COLUMN.flap_deg], *FLAPERON_OF_FLAP))
+    droop = float(np.interp(row[COLUMN.flap_deg], *airframe.FLAPERON_OF_FLAP))
     angles = {"elevator": float(row[COLUMN.elevator_deg])}
     for name, side, _ in SIDES:
         angles[f"flap_{name}"] = float(row[COLUMN.flap_deg])

@@ -15,8 +15,9 @@ import numpy as np
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.processes import safe_environment
+from telemetry.exchange.endpoint import Endpoint
 from telemetry.exchange.ring import TIMING_COUNT
-from telemetry.mavlink.config import Endpoint, MavlinkConfig
+from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import Feedback
 from telemetry.mavlink.link import MavlinkLink
 

@@ -13,8 +13,9 @@ from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.errors import InputError, OutputError
 from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry.exchange.endpoint import Endpoint
 from telemetry.exchange.ring import TIMING_COUNT
-from telemetry.mavlink.config import Endpoint, MavlinkConfig
+from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import Feedback
 from telemetry.mavlink.framing import signature_time
 from telemetry.mavlink.link import MavlinkLink
@@ -194,7 +195,8 @@ def test_the_vehicle_ends_when_the_flight_is_gone(ground):
 
     code = (
         "import sys, time\n"
-        "from telemetry.mavlink.config import Endpoint, MavlinkConfig\n"
+        "from telemetry.exchange.endpoint import Endpoint\n"
+        "from telemetry.mavlink.config import MavlinkConfig\n"
         "from telemetry.mavlink.link import MavlinkLink\n"
         f"link = MavlinkLink(MavlinkConfig(targets=(Endpoint('127.0.0.1', {ground.endpoint.port}),)))\n"
         "link.wait_ready(); print(link._process.pid, flush=True); time.sleep(60)\n"

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.errors import InputError, OutputError
+from telemetry.exchange.endpoint import Endpoint
 from telemetry.joystick.keyboard import KEYBOARD_MAP, Keyboard
 from telemetry.joystick.mapping import Controls, DeviceState, Mapper, axis_value, function_words
 from telemetry.joystick.screen import bar, picture
@@ -33,7 +34,6 @@ from telemetry.joystick.stick_map import (
     parse_stick_map,
 )
 from telemetry.joystick.wizard import find_axis, find_button, make_map, map_text, springs_back, write_map
-from telemetry.mavlink.config import Endpoint
 from telemetry.mavlink.pilot_input import STANDARD_AXES, STANDARD_BUTTONS
 
 XBOX = load_gamepad_map("xbox")

@@ -17,8 +17,10 @@ from pymavlink.dialects.v20 import all as dialect
 from rtsim.command import StickInput
 from rtsim.errors import InputError
 from rtsim.processes import safe_environment
+from telemetry.exchange.endpoint import Endpoint
+from telemetry.exchange.globe import HomePosition
 from telemetry.exchange.ring import Ring
-from telemetry.mavlink.config import Endpoint, HomePosition, MavlinkConfig, Ratings, endpoints, read_signing_key
+from telemetry.mavlink.config import MavlinkConfig, Ratings, endpoints, read_signing_key
 from telemetry.mavlink.exchange import STOP, Exchange, Feedback, Request
 from telemetry.mavlink.framing import frames, signature_time
 from telemetry.mavlink.notices import FLAP_SPEEDS

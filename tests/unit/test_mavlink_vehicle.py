@@ -10,8 +10,9 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from rtsim.frame import COLUMN, SIGNAL_COUNT
+from telemetry.exchange.globe import HomePosition
 from telemetry.exchange.ring import ROW_WIDTH
-from telemetry.mavlink.config import HomePosition, MavlinkConfig
+from telemetry.mavlink.config import MavlinkConfig
 from telemetry.mavlink.exchange import ALIVE, Exchange, Feedback, Request
 from telemetry.mavlink.peers import MOST_PEERS
 from telemetry.mavlink.vehicle import Vehicle

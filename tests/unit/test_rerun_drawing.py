@@ -9,7 +9,7 @@ import rerun as rr
 from rtsim.frame import COLUMN, SIGNAL_COUNT, SIGNAL_NAMES
 from telemetry.log.format import LOG_NAMES, LOG_SIGNALS
 from telemetry.log.signal_groups import FLAGS, label, plot_groups
-from telemetry.view import airframe
+from telemetry.view import airframe, undercarriage
 from telemetry.view import corridor as rerun_corridor
 from telemetry.view.blueprint import blueprint
 from telemetry.view.plots import ACTING_NAMES, PILOT_PLOTS, acting_on
@@ -21,6 +21,9 @@ PARTS = {
     "tail": airframe.tail(),
     "nacelle": airframe.nacelle(),
     "blades": airframe.blades(1.0),
+    "fairing": undercarriage.fairing(-1.0),
+    **{f"{name} strut": leg.strut for name, leg in undercarriage.legs().items()},
+    **{f"{name} wheels": leg.wheels for name, leg in undercarriage.legs().items()},
 }
 
 

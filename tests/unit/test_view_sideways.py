@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.view import airframe, gauges, ground_map, instruments, scene
+from telemetry.view import airframe, gauges, ground_map, instruments, scene, undercarriage
 from telemetry.view.colours import GREEN, LEFT_ROTOR, RED, RIGHT_ROTOR, TRAIL, WHITE, WIND
 from telemetry.view.strokes import Colour, LineArt
 
@@ -188,6 +188,25 @@ def test_what_does_not_move_sends_nothing_and_a_straight_flight_little() -> None
     assert arrow.vectors.as_arrow_array().to_pylist()[0] == pytest.approx([0.0, 2.5, 0.0])  # type: ignore[attr-defined]
     shown.update(row_of(time_s=0.5))
     assert isinstance(recording.take()["world/wind"], rr.Clear)
+
+
+def test_wheels_are_down_to_land_pressed_on_the_ground_and_gone_in_cruise() -> None:
+    recording = Recording()
+    shown = scene.Scene(recording)
+    shown.update(row_of(nacelle_deg=90.0))
+    down = {path for path in recording.take() if "leg_" in path}
+    assert {f"world/aircraft/leg_{name}/wheels" for name in ("nose", "left", "right")} <= down
+    shown.update(row_of(nacelle_deg=88.0, weight_on_wheels=1.0))
+    (wheels,) = [archetype for path, archetype in recording.logged if path == "world/aircraft/leg_left/wheels"]
+    up = wheels.translation.as_arrow_array().to_pylist()[0]  # type: ignore[attr-defined]
+    assert up == pytest.approx([0.0, 0.0, -0.5 * undercarriage.MAIN_STROKE])
+    centre = recording.take()["world/aircraft"].translation.as_arrow_array().to_pylist()[0]  # type: ignore[attr-defined]
+    assert centre == pytest.approx([0.0, 0.0, -undercarriage.STANDING_HEIGHT])  # the ground is where the wheels stand
+    for nacelle, kinds in ((65.0, rr.Transform3D), (10.0, rr.Clear), (70.0, rr.Transform3D)):
+        shown.update(row_of(nacelle_deg=nacelle))
+        assert isinstance(recording.take()["world/aircraft/leg_nose"], kinds)
+        shown.update(row_of(nacelle_deg=nacelle))
+        assert "world/aircraft/leg_nose" not in recording.take()
 
 
 def test_the_runway_lies_along_the_departure_and_the_camera_follows_the_heading() -> None:
