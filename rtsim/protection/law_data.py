@@ -11,7 +11,7 @@ LAW_OFF, LAW_MONITOR, LAW_GOVERNOR, LAW_FULL = 0, 1, 2, 3
 
 # Reasons, as recorded: 0 none, else one more than the number of the limit in rtsim.protection.limits.LIMIT_KINDS.
 REASON_NONE, REASON_LOW, REASON_HIGH, REASON_GATE = 0, 1, 2, 3
-REASON_FLAP, REASON_TORQUE, REASON_PITCH, REASON_SINK = 6, 7, 9, 11
+REASON_FLAP, REASON_TORQUE, REASON_LOAD, REASON_PITCH, REASON_SINK = 6, 7, 8, 9, 11
 REASON_BANK, REASON_SIDESLIP = 15, 16
 
 LAW = Places(
@@ -146,6 +146,12 @@ class LawSettings(NamedTuple):
     """Full: pitch attitude kept to [rad]."""
     pitch_frequency: float
     """Full: how sharply pitch may approach it [rad/s]."""
+    load_factor_max: float
+    """Full: largest load factor kept to."""
+    load_factor_min: float
+    """Full: smallest load factor kept to."""
+    load_frequency: float
+    """Full: how sharply the pitch rate may approach theirs [rad/s]."""
     turn_lead: float
     """How far ahead the bank is taken to grow as it does, for the corridor of the turn [s]."""
     turn_margin: float

@@ -32,7 +32,14 @@ LAW_PLUGIN = PluginKind(
     page="docs/protection.md",
 )
 """A protection law as plug-in."""
-_CLIPS = (data.REASON_FLAP, data.REASON_PITCH, data.REASON_TORQUE, data.REASON_BANK, data.REASON_SIDESLIP)
+_CLIPS = (
+    data.REASON_FLAP,
+    data.REASON_LOAD,
+    data.REASON_PITCH,
+    data.REASON_TORQUE,
+    data.REASON_BANK,
+    data.REASON_SIDESLIP,
+)
 _WARNING_TIME = 5.0
 
 
@@ -151,6 +158,9 @@ class BuiltInLaw:
         known = sensor_array(sensors)
         if reason == data.REASON_FLAP:
             return float(limits.flapping - sideways_limiter_kernels.worst_flapping(known))
+        if reason == data.REASON_LOAD:
+            load = sensors.load_factor
+            return float(min(limits.load_factor_max - load, load - limits.load_factor_min))
         if reason == data.REASON_PITCH:
             return float(limits.pitch - abs(sensors.pitch))
         if reason == data.REASON_BANK:

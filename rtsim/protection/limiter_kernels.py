@@ -16,6 +16,7 @@ from rtsim.protection.law_data import (
     REASON_FLAP,
     REASON_GATE,
     REASON_HIGH,
+    REASON_LOAD,
     REASON_LOW,
     REASON_NONE,
     REASON_PITCH,
@@ -26,6 +27,10 @@ from rtsim.protection.law_data import (
     TorqueTables,
 )
 from rtsim.protection.prediction_kernels import accelerations, affine, model_at, roll_out, speed_range, turn_model
+from rtsim.units import GRAVITY
+
+_LOADS_FROM = 10.0
+"""Airspeed from which a pitch rate is reckoned as load [m/s]."""
 
 
 @inner_kernel
@@ -285,7 +290,7 @@ def limit_stick(
     nacelle_rate: float,
     measured_flapping: float,
 ) -> None:
-    """Bound the stick so that pitch attitude and, with priority, flapping stay inside.
+    """Bound the stick so that pitch attitude, load factor and, with priority, flapping stay inside.
 
     Args:
         state: Law state; the stick's bounds are set.
@@ -304,8 +309,16 @@ def limit_stick(
         f = settings.pitch_frequency
         up = f * f * (settings.pitch - z[3]) - 2.0 * f * z[2]
         down = -f * f * (settings.pitch + z[3]) - 2.0 * f * z[2]
-        low, high = (up - at_rest) / power, (down - at_rest) / power
         low_reason, high_reason = REASON_PITCH, REASON_PITCH
+        # A pull or a push adds the pitch rate times the airspeed over g to the load of the turn.
+        per_rate, f = max(abs(z[0]), _LOADS_FROM) / GRAVITY, settings.load_frequency
+        load, most, least = cell[model.CELL.load], settings.load_factor_max, settings.load_factor_min
+        pull, push = f * ((most - load) / per_rate - z[2]), f * ((least - load) / per_rate - z[2])
+        if pull < up:
+            up, low_reason = pull, REASON_LOAD
+        if push > down:
+            down, high_reason = push, REASON_LOAD
+        low, high = (up - at_rest) / power, (down - at_rest) / power
 
     slope_c, slope_s = cell[model.CELL.flap_c + 4], cell[model.CELL.flap_s + 4]
     square = slope_c * slope_c + slope_s * slope_s

@@ -39,6 +39,7 @@ def bank_limit(limits: SidewaysLimits, angle: float) -> float:
     """Largest bank [rad].
 
     Args:
+        limits: Of the aircraft.
         angle: Nacelle angle [rad].
     """
     share = (angle - limits.bank_nacelle) / (_RIGHT_ANGLE - limits.bank_nacelle)
@@ -52,6 +53,7 @@ def sideward_limit(limits: SidewaysLimits, airspeed: float) -> float:
     """Largest sideward airspeed along body y [m/s].
 
     Args:
+        limits: Of the aircraft.
         airspeed: Airspeed ahead [m/s].
     """
     share = (abs(airspeed) - limits.slow_below) / (limits.fast_above - limits.slow_below)
