@@ -29,10 +29,17 @@ WHOLE_FLIGHT_EVERY = 5
 
 def rows() -> dict[str, Callable[[], int]]:
     """What is measured, by name: each does its work once and gives the number of steps done."""
-    setup = FlightSetup(programme=load_scenario("typical_conversion").programme)
-    simulation = Simulation(setup.with_options(protection="monitor", corridor="design"))
+
+    def simulated(name: str) -> Simulation:
+        setup = FlightSetup(programme=load_scenario(name).programme)
+        return Simulation(setup.with_options(protection="monitor", corridor="design"))
+
+    simulation = simulated("typical_conversion")
     simulation.run(5000)
     begin = simulation.snapshot()
+    turning = simulated("conversion_turn")
+    turning.run(5000)
+    banked = turning.snapshot()
     aircraft, nacelle = load_aircraft(), deg(75.0)
     point = aircraft.trim(airspeed=kt(100.0), nacelle=nacelle)
     other = jsbsim.FGFDMExec(None)
@@ -49,6 +56,10 @@ def rows() -> dict[str, Callable[[], int]]:
     def closed_loop() -> int:
         simulation.restore(begin)
         return len(simulation.run(1000))
+
+    def turning_loop() -> int:
+        turning.restore(banked)
+        return len(turning.run(1000))
 
     def frame_by_frame() -> int:
         simulation.restore(begin)
@@ -67,6 +78,7 @@ def rows() -> dict[str, Callable[[], int]]:
     return {
         "JSBSim c172p, run()": jsbsim_steps,
         "closed loop, compiled": closed_loop,
+        "the same in a turn": turning_loop,
         "Simulation.step()": frame_by_frame,
         "plant step from Python": plant,
         "scenarios.fly(speed='max')": whole_flight,
