@@ -1,8 +1,10 @@
 """The plant that the pilot's lateral half is designed for at one grid point: rigid body, hands, gust and integrals.
 
 Made as ``rtsim.pilot.design_plant`` makes the longitudinal one: the rotors' states are residualized, the actuators of
-one hand become one lag, a side gust gets a first-order Dryden filter. Displays are lateral airspeed (gust included),
-roll rate, bank, yaw rate and heading, and the integrals of heading and of the aircraft's own lateral velocity.
+one hand become one lag, a side gust gets a first-order Dryden filter. A roll gust is over once the wing has left it: it
+is white noise of the intensity that its spectrum has at low frequencies (MIL-F-8785C 3.7.1.4). Displays are lateral
+airspeed (gust included), roll rate, bank, yaw rate and heading, and the integrals of heading and of the aircraft's own
+lateral velocity.
 """
 
 from __future__ import annotations
@@ -13,6 +15,8 @@ import numpy as np
 
 from rtsim.aircraft.variables import LATERAL_INPUTS, LATERAL_STATES, of_role, position
 from rtsim.arrays import FloatArray
+from rtsim.atmosphere.dryden_kernels import roll_intensity
+from rtsim.kernels.compiled import interpreted
 from rtsim.lpv.lateral import LateralData
 from rtsim.lpv.reduction import eliminated
 from rtsim.pilot.weights import LateralPilotSettings
@@ -26,6 +30,8 @@ STATES = (*RIGID, "lateral_stick_lag", "pedal_lag", "gust_v", "heading_integral"
 DISPLAYS = ("lateral_velocity", "roll_rate", "bank", "yaw_rate", "heading", "heading_integral",
             "lateral_velocity_integral")  # fmt: skip
 """What the pilot sees."""
+GUSTS = ("gust_v", "gust_p")
+"""Gusts the pilot reckons with, as inputs of the database."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +45,7 @@ class LateralPlant:
     C: FloatArray
     """Displays (7, 10)."""
     E: FloatArray
-    """White noise of the gust filter (10, 1)."""
+    """White noises: of the side gust's filter, and the roll gust (10, 2)."""
 
 
 def lateral_plant(
@@ -57,11 +63,11 @@ def lateral_plant(
     rigid = [position(LATERAL_STATES, name) for name in RIGID]
     lags = list(of_role(LATERAL_STATES, "actuator"))
     slow = rigid + lags
-    inputs = [position(LATERAL_INPUTS, name) for name in (*HANDS, "gust_v")]
+    inputs = [position(LATERAL_INPUTS, name) for name in (*HANDS, *GUSTS)]
     a, b = eliminated(full_a, full_b, slow, inputs)
 
     n, r = len(STATES), len(RIGID)
-    plant_a, plant_b, plant_e = np.zeros((n, n)), np.zeros((n, len(HANDS))), np.zeros((n, 1))
+    plant_a, plant_b, plant_e = np.zeros((n, n)), np.zeros((n, len(HANDS))), np.zeros((n, len(GUSTS)))
     plant_a[:r, :r] = a[:r, :r]
     for hand in range(len(HANDS)):
         driven = [k for k in range(r, len(slow)) if b[k, hand] != 0.0]
@@ -70,9 +76,12 @@ def lateral_plant(
         plant_a[r + hand, r + hand], plant_b[r + hand, hand] = -min(rates), min(rates)
     gust = r + len(HANDS)
     plant_a[:r, gust] = b[:r, len(HANDS)]
-    pole = max(abs(airspeed), settings.gust_least_airspeed) / settings.gust_length
+    speed = max(abs(airspeed), settings.gust_least_airspeed)
+    pole = speed / settings.gust_length
     plant_a[gust, gust] = -pole
     plant_e[gust, 0] = settings.gust_intensity * np.sqrt(2.0 * pole)
+    roll = interpreted(roll_intensity)(settings.span, settings.gust_intensity, settings.gust_length)
+    plant_e[:r, 1] = b[:r, len(HANDS) + 1] * roll * np.sqrt(8.0 * settings.span / (np.pi * speed))
     plant_a[n - 2, RIGID.index("heading")] = 1.0
     plant_a[n - 1, RIGID.index("v")] = 1.0  # the own velocity: as for the airspeed's integral in the longitudinal plant
     c = np.zeros((len(DISPLAYS), n))

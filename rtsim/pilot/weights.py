@@ -98,6 +98,8 @@ class LateralPilotSettings:
     """Fastest movement of the lateral stick [1/s]."""
     pedal_rate_limit: float
     """Fastest movement of the pedals [1/s]."""
+    span: float
+    """Wing span, over which a roll gust reaches [m]."""
     integral_time: float
     integral_noise_ratio: float
     delay: float
@@ -182,4 +184,5 @@ def lateral_pilot_settings(profile: AircraftProfile) -> LateralPilotSettings:
     numbers: dict[str, Any] = {
         name: part.number(f"{name}_{unit}", low=low, high=high) for name, unit, low, high in _LATERAL_NUMBERS
     }
+    numbers["span"] = ft(profile.dimensions.number("span_ft", low=1.0, high=1000.0))
     return LateralPilotSettings(**displays, **numbers, **{name: getattr(shared, name) for name in _SHARED})
