@@ -37,6 +37,10 @@ def shipped_toml(folder: str, name: str) -> dict[str, Any]:
     return tomllib.loads(_shipped_text(folder, name))
 
 
+FEW = 8
+"""As many names as a message lists."""
+
+
 def named_text(
     name_or_path: str | Path, *, folder: str, noun: str, key: str, largest: int = LARGEST_TEXT
 ) -> tuple[str, str]:
@@ -61,11 +65,14 @@ def named_text(
         return read_text(name_or_path, noun=noun, largest=largest, missing=missing), text
     if text in names:
         return _shipped_text(folder, f"{text}.toml"), text
+    near = closest(text, names)
+    if len(near) > FEW:
+        near = [*near[: FEW - 1], f"and {len(near) - FEW + 1} more (rtsim {noun}s lists them)"]
     raise InputError(
         f"is not a {noun} of the library",
         key=key,
         value=text,
-        allowed=", ".join(closest(text, names)),
+        allowed=", ".join(near),
         mend=f"{suggestion(text, names, otherwise='choose one')}, or give a path ending in .toml",
     )
 

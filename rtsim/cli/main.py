@@ -29,6 +29,7 @@ EXIT_INTERRUPTED = 130
 
 COMMAND_MODULES = (
     "fly",
+    "scenarios",
     "replay",
     "analysis",
     "rotor",
