@@ -27,7 +27,7 @@ class MiddleOfTheRoad:
     def __init__(self) -> None:
         corridor = load_corridor("design")
         self.angles = np.radians(np.linspace(90.0, 0.0, 91))
-        self.speeds = np.maximum.accumulate([corridor.centre_speed(angle) for angle in self.angles])
+        self.speeds = np.maximum.accumulate([float(corridor.centre_speed(angle)) for angle in self.angles])
 
     def step(self, sensors: Sensors, command: Command, dt: float) -> float:
         """One call.

@@ -47,8 +47,8 @@ class Hoverer:
 
 
 def main() -> None:
-    """Hover for 20 s in light gusts from all sides and say how well."""
-    gusts = Overrides(pilot="own_pilot:Hoverer", turbulence="light", lateral_turbulence=True, duration=20.0)
+    """Hover for 15 s in light gusts from all sides and say how well."""
+    gusts = Overrides(pilot="own_pilot:Hoverer", turbulence="light", lateral_turbulence=True, duration=15.0)
     flight = scenarios.fly("hover", speed="max", overrides=gusts)
     height = abs(flight["altitude_m"] - 100.0).max()
     print(f"{flight.end_reason}: height within {height:.1f} m, bank within {abs(flight['bank_deg']).max():.1f} deg,")

@@ -16,7 +16,7 @@ from rtsim.cli.main import run
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FINDS = {
-    "own_pilot": [r"flown to its end at 20\.0 s: height within 0\.\d m, bank within [12]\.\d deg"],
+    "own_pilot": [r"flown to its end at 15\.0 s: height within 0\.\d m, bank within [12]\.\d deg"],
     "own_nacelle_law": [
         r"programme +worst margin 2\d\.\d kn",
         r"MiddleOfTheRoad +worst margin 3\d\.\d kn.*nacelles end at 0\.0 deg",
