@@ -106,6 +106,7 @@ def obey(line: str) -> None:
         assert line == "mkdir my-flights && cd my-flights"
 
 
+@pytest.mark.slow
 def test_the_tutorial_is_true(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
