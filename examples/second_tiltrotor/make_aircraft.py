@@ -126,4 +126,4 @@ def make(folder: Path, *, jobs: int = 1, outer_loops: Sequence[OuterLoop] = OUTE
 
 
 if __name__ == "__main__":
-    print(make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE, jobs=2))  # noqa: T201
+    print(make(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE, jobs=2))

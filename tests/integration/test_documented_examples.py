@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+import runpy
+import shlex
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -53,6 +56,65 @@ def test_a_database_of_ones_own_is_used_as_shown(tmp_path: Path, monkeypatch: py
     monkeypatch.chdir(tmp_path)
     assert run(["model", "export", "mine.nc"]) == 0
     exec(compile(block("lpv.md", "python", "mine.nc"), "lpv.md", "exec"), {})
+
+
+NAMED = re.compile(r"`([a-z_]+\.(?:toml|py))`[^`]*\Z")
+"""The file that a page says to write, just before its block."""
+
+
+def walk(page: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Do what a page says from top to bottom, in the present folder: write the files, run the rest, compare what comes.
+
+    A flight in real time is flown headless and fast. pandas, which rtsim does not need, is used where it is installed.
+    """
+    text = (DOCS / page).read_text(encoding="utf-8")
+    out, end = "", 0
+    for found in re.finditer(r"^```(\w+)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE):
+        kind, content, before = found[1], found[2], text[end : found.start()]
+        end = found.end()
+        named = NAMED.search(before)
+        if kind == "text":
+            shown = [line for line in content.splitlines() if line != "..."]
+            assert [line for line in shown if squeezed(line) not in squeezed(out)] == [], out
+        elif kind == "sh":
+            capsys.readouterr()
+            for line in content.splitlines():
+                obey(line)
+            captured = capsys.readouterr()
+            out = captured.out + captured.err
+        elif kind in {"toml", "python"} and named:
+            Path(named[1]).write_text(content, encoding="utf-8")
+        elif "import pandas" not in content or find_spec("pandas"):
+            assert kind == "python", f"nobody runs this {kind}"
+            exec(compile(content, page, "exec"), {})
+
+
+def squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def obey(line: str) -> None:
+    """Run one command of a page; a comment says its exit code where it is not 0."""
+    command, _, remark = line.partition("  # exit code ")
+    program, *words = shlex.split(command)
+    if program == "python":
+        runpy.run_path(words[0], run_name="__main__")
+    elif program == "rtsim":
+        live = words[0] == "fly" and "--headless" not in words
+        assert run([*words, *(["--headless", "--speed", "max"] if live else [])]) == int(remark or 0), line
+    else:
+        assert line == "mkdir my-flights && cd my-flights"
+
+
+@pytest.mark.slow
+def test_the_tutorial_is_true(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "bank_keeper", raising=False)
+    walk("tutorial.md", capsys)
+    assert "<img alt='corridor path" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_objects_show_themselves_in_a_line() -> None:
