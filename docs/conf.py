@@ -38,7 +38,7 @@ def list_decisions(_app, docname, source):
 def no_type_in_text(_app, what, _name, _object, _options, lines):
     """Keep napoleon from reading what stands before a colon as the type of a field: types are annotations here."""
     if what in {"attribute", "data", "property"}:
-        lines.insert(0, "")
+        lines[:0] = ["..", ""]  # an empty comment
 
 
 def setup(app):
