@@ -1,6 +1,7 @@
-"""Writes the tables of a flight's options and of its metrics into the pages.
+"""Writes the tables of a flight's options, metrics, signals and MAVLink messages into the pages.
 
-They are declared in ``rtsim/loop/options.py`` and ``rtsim/measures/metric_kernels.py``. After a change there:
+They are declared in ``rtsim/loop/options.py``, ``rtsim/measures/metric_kernels.py``, ``rtsim/frame.py`` and
+``telemetry/mavlink/streams.py``. After a change there:
 
     python -m docs.tables
 """
@@ -10,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rtsim.loop.options import Option, declared
 
@@ -62,10 +63,48 @@ def _metrics_table(heading: str, shown: Mapping[str, Metric]) -> str:
     return "\n".join([*lines, *(_row(f"`{name}`", item.text) for name, item in shown.items())])
 
 
+def signal_tables() -> str:
+    """Every column of the history and of the log, a table for each group."""
+    from rtsim.frame import SIGNALS, TIMING_SIGNALS
+
+    groups: dict[str, list[str]] = {}
+    for signal in (*SIGNALS, *TIMING_SIGNALS):
+        row = _row(f"`{signal.name}`", signal.unit, signal.description.removesuffix("."))
+        groups.setdefault(signal.group, []).append(row)
+    head = "| signal | unit | meaning |\n|---|---|---|\n"
+    return "\n\n".join(f"## {group.capitalize()}\n\n{head}" + "\n".join(rows) for group, rows in groups.items())
+
+
+def message_tables() -> str:
+    """The fields of every MAVLink message that is streamed."""
+    from pymavlink.dialects.v20.all import mavlink_map
+
+    from telemetry.mavlink.streams import DEFAULT_RATES_HZ
+
+    parts = []
+    for number, rate in sorted(DEFAULT_RATES_HZ.items(), key=lambda item: mavlink_map[item[0]].msgname):
+        message = mavlink_map[number]
+        lengths = dict(zip(message.ordered_fieldnames, message.array_lengths, strict=True))
+        rows = [
+            _row(f"`{name}`", kind + (f"[{lengths[name]}]" if lengths[name] else ""), _unit_of(message, name))
+            for name, kind in zip(message.fieldnames, message.fieldtypes, strict=True)
+        ]
+        title = f"## {message.msgname}\n\nNumber {number}, {rate:g} Hz.\n\n| field | type | unit |\n|---|---|---|\n"
+        parts.append(title + "\n".join(rows))
+    return "\n\n".join(parts)
+
+
+def _unit_of(message: Any, field: str) -> str:
+    """The unit of a field, or the enumeration of its values."""
+    return message.fieldunits_by_name.get(field) or message.fieldenums_by_name.get(field, "")
+
+
 TABLES: dict[str, tuple[Callable[[], str], ...]] = {
     "scenarios.md": (scenario_table, flight_metrics_table),
     "commands.md": (command_table,),
     "testing-protection.md": (trial_metrics_table,),
+    "signals.md": (signal_tables,),
+    "mavlink-fields.md": (message_tables,),
 }
 """Pages with tables, and what makes each, in order."""
 
