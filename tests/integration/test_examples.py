@@ -83,7 +83,7 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         import nbclient
         import nbformat
 
-        nbclient.NotebookClient(nbformat.from_dict(notebook), timeout=300).execute()
+        nbclient.NotebookClient(nbformat.reads(json.dumps(notebook), as_version=4), timeout=300).execute()
         return
     names: dict[str, object] = {}
     for number, cell in enumerate(cells):
