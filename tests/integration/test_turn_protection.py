@@ -19,21 +19,21 @@ from scenarios.campaign.trial import Bench, FlightPlan
 
 SPEC, _ = load_campaign("turns")
 CLASSES = [item.name for item in SPEC.classes]
-LEAVE = {"steep_turn": "bank", "pedals": "sideslip", "runaway": ""}
-"""What the unprotected flights of a class violate, where it is not always the corridor; of a runaway, not every one."""
+LEAVE = {"pedals": "sideslip", "runaway": ""}
+"""What unprotected flights of a class violate, where it is not the corridor; of a runaway, not every one."""
 
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_full_keeps_the_corridor_where_unprotected_flights_leave_it(name):
     """The campaign's classes, two flights each: none outside, none harmed, and not vacuous."""
-    number = CLASSES.index(name)
+    number, needed, left = CLASSES.index(name), LEAVE.get(name, "corridor"), False
     for run in range(2):
         plan = draw_plan(SPEC, seed=3, class_number=number, run=run)
         off, full = (Bench().fly(plan, law).metrics for law in ("off", "full"))
-        needed = LEAVE.get(name, "corridor")
-        assert not needed or needed in off.exceeded
+        left |= needed in off.exceeded
         assert not {"corridor", "control"} & full.exceeded, (run, full.exceeded)
         assert not EVENTS["harmed"](full.numbers[None, :], off.numbers[None, :])[0]
+    assert left or not needed
 
 
 def steep_turn(side: float) -> FlightPlan:
