@@ -82,7 +82,7 @@ def alone():
     return flown()
 
 
-def same(first, second):
+def assert_same(first, second):
     assert [item.held for item in first.judged] == [item.held for item in second.judged]
     for one, other in zip(first.flights.metrics, second.flights.metrics, strict=True):
         np.testing.assert_array_equal(one, other)
@@ -100,7 +100,7 @@ def test_the_campaign_holds_and_tells_laws_apart(alone):
 
 
 def test_two_processes_give_the_same(alone):
-    same(alone, flown(LocalExecutor(2)))
+    assert_same(alone, flown(LocalExecutor(2)))
 
 
 class Backwards(LocalExecutor):
@@ -110,7 +110,7 @@ class Backwards(LocalExecutor):
 
 def test_pieces_may_be_finished_in_any_order(alone, tmp_path):
     options = CampaignOptions(early_stop=False, folder=tmp_path)
-    same(alone, run_campaign(*campaign(), options=options, executor=Backwards(1)))
+    assert_same(alone, run_campaign(*campaign(), options=options, executor=Backwards(1)))
     assert len(list((tmp_path / "chunks").glob("*.npz"))) == len(plan_chunks(campaign()[0], None))
 
 
@@ -144,7 +144,7 @@ def test_an_interrupted_campaign_goes_on_to_the_same_verdict(alone, tmp_path):
     damaged[0].write_bytes(damaged[0].read_bytes()[:100])  # a piece that was cut off counts as not flown
     resumed = flown(folder=tmp_path / "kept")
     assert resumed.reused == 1
-    same(alone, resumed)
+    assert_same(alone, resumed)
     with pytest.raises(InputError, match="another campaign"):
         flown(folder=tmp_path / "kept", seed=5)
     assert flown(folder=tmp_path / "kept", seed=5, fresh=True).reused == 0
@@ -201,7 +201,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same(alone, cluster):
         killer.join()
         connected.__exit__(None, None, None)
     assert victim not in [worker.pid for worker in cluster.workers.values() if worker.status.name == "running"]
-    same(alone, result)
+    assert_same(alone, result)
 
 
 def test_runs_are_planned_in_turn():

@@ -150,7 +150,7 @@ def test_the_nonlinear_model_flies_the_winner(problem, found):
     assert figures.altitude_deviation_m < 4.5
 
 
-def same(first, second):
+def assert_same(first, second):
     assert np.array_equal(first.best, second.best)
     for name in ("objectives", "constraints", "feasible", "history", "generations", "evaluations", "interrupted"):
         assert getattr(first, name) == getattr(second, name)
@@ -165,11 +165,11 @@ def test_resuming_ends_where_an_uninterrupted_search_ends(problem, found, tmp_pa
     assert cut.generations == 2
     assert [progress.evaluations for progress in told] == [8, 16]
     resumed = run_search(problem, record_path=record)
-    same(resumed, found)
+    assert_same(resumed, found)
     # All from the record: nothing is flown any more.
     again = run_search(problem, record_path=record)
     assert np.isnan(again.seconds_per_generation)
-    same(again, found)
+    assert_same(again, found)
 
 
 def test_an_interruption_in_a_generation_keeps_what_was_found(problem, found, tmp_path):
@@ -188,7 +188,7 @@ def test_an_interruption_in_a_generation_keeps_what_was_found(problem, found, tm
     assert cut.interrupted
     assert cut.generations == 2
     assert cut.objectives[0] == found.history[1]
-    same(run_search(problem, record_path=record), found)
+    assert_same(run_search(problem, record_path=record), found)
 
 
 def test_a_record_from_elsewhere_is_refused(problem, found, tmp_path):
@@ -203,7 +203,7 @@ def test_a_record_from_elsewhere_is_refused(problem, found, tmp_path):
 
 
 def test_workers_change_nothing(found):
-    same(run_search(problem_of(workers=3, search=SMALL)), found)
+    assert_same(run_search(problem_of(workers=3, search=SMALL)), found)
 
 
 @pytest.mark.parametrize(("method", "handling"), [("ga", "feasibility"), ("ga", "penalty"), ("cma-es", "penalty")])
