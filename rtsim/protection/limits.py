@@ -210,7 +210,9 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
     """
     part = _part(profile)
     law, governor, full = part.table("law"), part.table("governor"), part.table("full")
+    limits = load_limits(profile)
     turn = part.table("turn") if part.has("turn") else xv15_profile().protection.table("turn")
+    load_buffer = turn.number("load_factor_buffer", low=0.0, high=5.0)
     return LawSettings(
         period=frames_per_decision(profile, dt=dt) * dt,
         horizon=law.number("horizon_s", low=0.1, high=60.0),
@@ -234,7 +236,7 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
         recovery_step=kt(full.number("recovery_step_kt", low=0.0, high=200.0)),
         height_floor=full.number("height_floor_m", low=0.0, high=1e4),
         height_full=full.number("height_full_m", low=0.0, high=1e4),
-        sink_slope=load_limits(profile).sink.slope,
+        sink_slope=limits.sink.slope,
         sink_floor=full.number("sink_rate_floor_m_s", low=0.0, high=100.0),
         flapping=deg(full.number("flapping_deg", low=0.1, high=60.0)),
         torque_share=full.number("torque_share", low=0.1, high=1.0),
@@ -242,8 +244,8 @@ def load_settings(profile: AircraftProfile | None = None, *, dt: float) -> LawSe
         collective_lag=full.number("collective_lag_s", low=0.001, high=10.0),
         pitch=deg(full.number("pitch_deg", low=1.0, high=80.0)),
         pitch_frequency=full.number("pitch_frequency_rad_s", low=0.01, high=20.0),
-        load_factor_max=turn.number("load_factor_max", low=1.0, high=20.0),
-        load_factor_min=turn.number("load_factor_min", low=-20.0, high=1.0),
+        load_factor_max=limits.load_factor_max - load_buffer,
+        load_factor_min=limits.load_factor_min + load_buffer,
         load_frequency=turn.number("load_frequency_rad_s", low=0.01, high=20.0),
         turn_lead=turn.number("lead_s", low=0.0, high=5.0),
         turn_margin=kt(turn.number("margin_kt", low=-50.0, high=100.0)),
