@@ -17,9 +17,9 @@ import sys
 import threading
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from typing import Any, Self
 
 from rtsim.errors import OutputError
 from rtsim.processes import ROOT, Stillness, end_process, ending, is_here, start_process
@@ -52,15 +52,62 @@ def work(function: Callable[..., Any], pieces: Iterable[tuple[Any, ...]], *, job
         WorkersDied: A piece ended one worker after the other.
     """
     pieces = list(pieces)
-    if jobs == 1 or len(pieces) <= 1:
-        for piece in pieces:
-            yield function(*piece)
-        return
-    pool = _Pool(function, pieces, jobs=min(jobs, len(pieces)))
-    try:
-        yield from pool.results()
-    finally:
-        pool.close()
+    with Workers(min(jobs, max(len(pieces), 1))) as workers:
+        yield from workers.work(function, pieces)
+
+
+class Workers:
+    """Processes that are kept between pieces of work; one works in this process."""
+
+    def __init__(self, jobs: int) -> None:
+        """Start none yet.
+
+        Args:
+            jobs: Processes; 1 works in this one.
+        """
+        self._jobs = jobs
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> Self:
+        """The workers."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End them."""
+        self.close()
+
+    def work(self, function: Callable[..., Any], pieces: Sequence[tuple[Any, ...]]) -> Iterator[Any]:
+        """Work on pieces and give the results in the order of the pieces.
+
+        Args:
+            function: What is done with each; a module has it.
+            pieces: Its arguments, piece by piece.
+
+        Yields:
+            The results. Workers are ended where it is closed before its end.
+
+        Raises:
+            WorkersDied: A piece ended one worker after the other.
+        """
+        if self._jobs == 1 or (len(pieces) <= 1 and not self._workers):
+            for piece in pieces:
+                yield function(*piece)
+            return
+        if not self._workers:
+            self._workers += [_Worker() for _ in range(self._jobs)]
+        try:
+            yield from _Pool(function, pieces, self._workers).results()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """End the processes."""
+        for worker in self._workers:
+            worker.connection.close()
+        for worker in self._workers:
+            end_process(worker.process)
+        self._workers.clear()
 
 
 class _Worker:
@@ -85,18 +132,16 @@ class _Worker:
 
 
 class _Pool:
-    """The workers, who has which piece, and what is finished."""
+    """Which worker has which piece, and what is finished."""
 
-    def __init__(self, function: Callable[..., Any], pieces: list[tuple[Any, ...]], *, jobs: int) -> None:
+    def __init__(self, function: Callable[..., Any], pieces: Sequence[tuple[Any, ...]], workers: list[_Worker]) -> None:
         self._function, self._pieces = function, pieces
         self._todo = deque(range(len(pieces)))
         self._deaths = [0] * len(pieces)
         self._done: dict[int, Any] = {}
-        self._workers: list[_Worker] = []
-        self._jobs = jobs
+        self._workers = workers
 
     def results(self) -> Iterator[Any]:
-        self._workers = [_Worker() for _ in range(self._jobs)]
         for wanted in range(len(self._pieces)):
             while wanted not in self._done:
                 self._hand_out(wanted)
@@ -118,7 +163,7 @@ class _Pool:
 
     def _hand_out(self, wanted: int) -> None:
         for worker in self._workers:
-            if worker.piece is None and self._todo and self._todo[0] < wanted + AHEAD * self._jobs:
+            if worker.piece is None and self._todo and self._todo[0] < wanted + AHEAD * len(self._workers):
                 worker.piece = self._todo.popleft()
                 worker.stillness.reset()
                 with contextlib.suppress(OSError):  # it died: that shows when its answer is read
@@ -149,12 +194,6 @@ class _Pool:
         )
         self._todo.appendleft(piece)
         self._workers[self._workers.index(worker)] = _Worker()
-
-    def close(self) -> None:
-        for worker in self._workers:
-            worker.connection.close()
-        for worker in self._workers:
-            end_process(worker.process)
 
 
 def main() -> None:

@@ -86,12 +86,16 @@ class Penalty:
 class CmaMethod:
     """CMA-ES; constraints by rank (Deb's rules, to which it is invariant like to any monotone change) or by penalty."""
 
-    def __init__(self, starts: FloatArray, *, population: int, seed: int, penalty: bool) -> None:
+    def __init__(
+        self, starts: FloatArray, *, population: int, seed: int, penalty: bool, step: float = FIRST_STEP
+    ) -> None:
         """Set up.
 
         Args:
             penalty: Constraints by penalty instead of by rank.
+            step: First standard deviation, in shares of the variables' ranges.
         """
+        self._step = step
         self._cma = _needed("cma", extra="optimize")
         self._random = stream_generator(seed, STREAM_SEARCH)
         self._starts = starts
@@ -100,7 +104,7 @@ class CmaMethod:
         self._asked: list[FloatArray] = []
         self._best: tuple[float, float, FloatArray] | None = None
         self._first = True
-        self._strategy = self._new_strategy(np.clip(starts[0], 0.01, 0.99), FIRST_STEP)
+        self._strategy = self._new_strategy(np.clip(starts[0], 0.01, 0.99), step)
 
     def _new_strategy(self, mean: FloatArray, step: float) -> Any:
         options = {
@@ -117,7 +121,7 @@ class CmaMethod:
     def ask(self) -> FloatArray:
         """See :class:`SearchMethod`."""
         if self._strategy.stop() and self._best is not None:  # converged with budget left: once more from the best
-            self._strategy = self._new_strategy(np.clip(self._best[2], 0.01, 0.99), 0.5 * FIRST_STEP)
+            self._strategy = self._new_strategy(np.clip(self._best[2], 0.01, 0.99), 0.5 * self._step)
         self._asked = [np.asarray(x, dtype=np.float64) for x in self._strategy.ask()]
         if self._first:
             # The start vectors compete in the first generation; the strategy takes them as its own draws.

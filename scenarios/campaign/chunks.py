@@ -23,6 +23,7 @@ from rtsim.errors import InputError
 from rtsim.loop.options import FlightOptions
 from rtsim.lpv.files.storage import load_database
 from rtsim.measures.metric_kernels import VALUE
+from rtsim.properties.formula import Flown, Property, parse_property
 from rtsim.protection.laws import LawSpec, load_laws
 from rtsim.protection.tables import LAW_NAMES
 from rtsim.units import kt
@@ -72,6 +73,8 @@ class Task:
     """Where modules of laws are looked for besides the installed ones."""
     aircraft_hash: str = ""
     """Hash of the aircraft, which a worker must have too."""
+    properties: tuple[str, ...] = ()
+    """Formulas that every flight is asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +97,8 @@ class ChunkResult:
     """The piece."""
     metrics: FloatArray
     """Metrics of every flight, shape (runs, laws, VALUE.size)."""
+    robustness: FloatArray
+    """Of every flight in every property, shape (runs, laws, properties)."""
     problems: tuple[tuple[int, int, str], ...]
     """What went wrong in laws: run, law, sentence."""
     seconds: FloatArray
@@ -126,23 +131,49 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
     Raises:
         InputError: This worker has another aircraft.
     """
-    spec = _spec(task.text, task.file)
-    _refuse_another(task)
+    spec = task_spec(task.text, task.file)
+    refuse_another(task)
     bench = Bench()
+    properties = [parse_property(formula) for formula in task.properties]
     metrics = np.zeros((chunk.count, len(task.laws), VALUE.size))
+    robustness = np.zeros((chunk.count, len(task.laws), len(properties)))
     seconds = np.zeros(len(task.laws))
     problems: list[tuple[int, int, str]] = []
     for k in range(chunk.count):
         run = chunk.first + k
         plan = draw_plan(spec, seed=task.seed, class_number=chunk.class_number, run=run, options=task.options)
+        twin = twin_of(bench, plan, properties)
         for number, law in enumerate(task.laws):
             begin = time.process_time()
             # The first run of every class asks laws in Python everything twice.
             flight = fly_law(bench, plan, law, folder=task.folder, repeat=run == 0)
             seconds[number] += time.process_time() - begin
             metrics[k, number] = flight.metrics.numbers
+            flown, dt = flown_of(flight), 1.0 / plan.setup.options.rate_hz
+            robustness[k, number] = [one.robustness(flown, dt, twin).value for one in properties]
             problems += [(run, number, text) for text in flight.law_problems]
-    return ChunkResult(chunk, metrics, tuple(problems), seconds)
+    return ChunkResult(chunk, metrics, robustness, tuple(problems), seconds)
+
+
+def flown_of(flight: TrialFlight) -> Flown:
+    """A flight as properties see it.
+
+    Args:
+        flight: The flight.
+    """
+    return Flown(flight.rows, flight.metrics.numbers)
+
+
+def twin_of(bench: Bench, plan: FlightPlan, properties: Sequence[Property]) -> Flown | None:
+    """The flight without a law, where a property speaks of it.
+
+    Args:
+        bench: What flies.
+        plan: The flight.
+        properties: What is asked of it.
+    """
+    asked = any(one.needs_twin for one in properties)
+    return flown_of(bench.fly(plan, "off", keep=True)) if asked else None
 
 
 def fly_law(
@@ -236,15 +267,28 @@ def task_identity(task: Task) -> dict[str, str]:
 
 
 @functools.lru_cache(maxsize=4)
-def _spec(text: str, file: str) -> CampaignFile:
+def task_spec(text: str, file: str) -> CampaignFile:
+    """Read the campaign of a task, once in every process.
+
+    Args:
+        text: The campaign file.
+        file: Where it came from.
+    """
     spec, problems = parse_campaign(text, file=file)
     if spec is None:
         raise problems[0]
     return spec
 
 
-def _refuse_another(task: Task) -> None:
-    """Refuse to fly where the aircraft is another than the campaign's."""
+def refuse_another(task: Task) -> None:
+    """Refuse to fly where the aircraft is another than the campaign's.
+
+    Args:
+        task: The campaign.
+
+    Raises:
+        InputError: It is another.
+    """
     log = logging.getLogger("rtsim.lpv.files.storage")
     level = log.level
     log.setLevel(logging.ERROR)  # what the aircraft borrows was said where the campaign was started

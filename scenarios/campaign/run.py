@@ -28,7 +28,7 @@ from scenarios.campaign.chunks import (
 )
 from scenarios.campaign.executors import Executor, LocalExecutor
 from scenarios.campaign.preflight import scenario_problems
-from scenarios.campaign.spec import CampaignFile
+from scenarios.campaign.spec import CampaignFile, properties_of
 from scenarios.campaign.store import Store
 from scenarios.campaign.verdict import Flights, Judged, decided, judge, summarize
 
@@ -123,6 +123,7 @@ class CampaignResult:
                     "interval": [item.rate.low, item.rate.high],
                     "upper_bound": item.rate.upper,
                     "limit": item.limit,
+                    "robustness_min": item.robustness,
                 }
                 for item in self.judged
             ],
@@ -258,6 +259,7 @@ def make_task(spec: CampaignFile, text: str, *, options: CampaignOptions, file: 
         options=flown,
         folder=folder,
         aircraft_hash=database_of(flown.aircraft).aircraft_hash,
+        properties=properties_of(spec),
     )
 
 
@@ -275,6 +277,7 @@ def identity(task: Task) -> dict[str, Any]:
         "plant": task.options.plant,
         "rate_hz": task.options.rate_hz,
         "metrics": list(VALUE.asdict()),
+        "properties": list(task.properties),
         "database": task.aircraft_hash,
         "versions": versions(),
     }
@@ -284,11 +287,16 @@ def _flights(
     spec: CampaignFile, laws: tuple[LawVariant, ...], results: Sequence[ChunkResult], planned: tuple[int, ...]
 ) -> Flights:
     empty = np.zeros((0, len(laws), VALUE.size))
+    none = np.zeros((0, len(laws), len(properties_of(spec))))
     return Flights(
         spec=spec,
         laws=laws,
         metrics=tuple(
             np.concatenate([empty, *(item.metrics for item in results if item.chunk.class_number == number)])
+            for number in range(len(spec.classes))
+        ),
+        robustness=tuple(
+            np.concatenate([none, *(item.robustness for item in results if item.chunk.class_number == number)])
             for number in range(len(spec.classes))
         ),
         planned=planned,

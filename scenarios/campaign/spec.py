@@ -22,7 +22,7 @@ from rtsim.strict import Examined, Strict
 from rtsim.toml_file import named_text, parse_toml
 from scenarios.campaign.events import EVENTS
 from scenarios.files.disturbances import FAULT_KEYS, faults_of
-from scenarios.files.expectation import name_problems
+from scenarios.files.expectation import name_problems, property_problems
 from scenarios.files.schema import FaultTable
 from scenarios.files.trial import LARGEST_PULSES
 
@@ -131,6 +131,17 @@ class PulseDraw(Strict):
     replaces: bool = False
 
 
+class SignalDraw(Strict):
+    """One of ``signals``: a control moved all the time, by steps that follow each other twice in a period."""
+
+    channel: Channel
+    begin_s: Number = 1.0
+    duration_s: Annotated[float, Field(gt=0.0, le=600.0)]
+    bandwidth_hz: Annotated[float, Field(ge=0.01, le=5.0)]
+    amount: Number
+    replaces: bool = False
+
+
 class TurnDraw(Strict):
     """``turn``: the turn the programme asks for, and keeps asking for."""
 
@@ -194,6 +205,7 @@ class ClassTable(_ClassOptions, Strict):  # type: ignore[misc]  # made from the 
     nacelle: NacelleDraw | None = None
     turn: TurnDraw | None = None
     pulses: list[PulseDraw] = []
+    signals: list[SignalDraw] = []
     faults: list[FaultDraw] = []
     gusts: list[GustDraw] = []
     turbulence_kt: Number = 0.0
@@ -205,7 +217,9 @@ class ExpectRate(Strict):
     """One of ``[[expect]]``: how often something may or must happen."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
-    event: str
+    event: str | None = None
+    property: str | None = None
+    """A formula of signal temporal logic; what is counted are the flights that break it."""
     of: str = "law"
     classes: list[str] = []
     upper_max: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
@@ -228,6 +242,15 @@ class CampaignFile(_FileOptions, Strict):  # type: ignore[misc]  # made from the
     confidence: Annotated[float, Field(gt=0.5, lt=1.0)] = 0.95
     classes: Annotated[list[ClassTable], Field(min_length=1, max_length=1000)]
     expect: list[ExpectRate] = []
+
+
+def properties_of(spec: CampaignFile) -> tuple[str, ...]:
+    """Formulas that a campaign asks of its flights, each once, in their order.
+
+    Args:
+        spec: The campaign.
+    """
+    return tuple(dict.fromkeys(clause.property for clause in spec.expect if clause.property is not None))
 
 
 def load_campaign(name_or_path: str | Path) -> tuple[CampaignFile, str]:
@@ -316,7 +339,13 @@ def _expectation_contradictions(spec: CampaignFile, file: str) -> list[InputErro
     names = [item.name for item in spec.classes]
     for number, clause in enumerate(spec.expect):
         key = f"expect[{number}]"
-        found += name_problems(clause.event, EVENTS, "an event", file=file, key=f"{key}.event")
+        if (clause.event is None) == (clause.property is None):
+            mend = "give one of them"
+            found.append(InputError("needs either event or property", file=file, key=key, mend=mend))
+        if clause.event is not None:
+            found += name_problems(clause.event, EVENTS, "an event", file=file, key=f"{key}.event")
+        if clause.property is not None:
+            found += property_problems(clause.property, file=file, key=f"{key}.property")
         laws = ("law", "off", spec.law, *spec.against)
         if clause.of not in laws:
             found.append(
@@ -349,7 +378,7 @@ def _odd(item: ClassTable) -> list[tuple[str, str, str]]:
         found.append((".turn", "needs either bank_deg or turn_rate_deg_s", "give one of them"))
     for number, fault in enumerate(item.faults):
         try:
-            fault_of(fault, lambda number: _extremes(number)[0], lambda listed: listed[0])
+            fault_of(fault, lambda _, number: _extremes(number)[0], lambda _, listed: listed[0])
         except InputError as error:
             key = FAULT_KEYS.get(error.key or "", error.key)
             found.append((f".faults[{number}].{key}", error.problem, error.mend or "correct it"))
@@ -357,28 +386,31 @@ def _odd(item: ClassTable) -> list[tuple[str, str, str]]:
 
 
 def fault_of(
-    table: FaultDraw, number: Callable[[Number], float], one: Callable[[Sequence[Any]], Any], begins: float = 0.0
+    table: FaultDraw,
+    number: Callable[[str, Number], float],
+    one: Callable[[str, Sequence[Any]], Any],
+    begins: float = 0.0,
 ) -> Fault:
     """Make a failure of a class.
 
     Args:
         table: What the class says.
-        number: Draws a number.
-        one: Chooses one of what is listed.
+        number: Draws the number of a key.
+        one: Chooses one of what is listed for a key.
         begins: When [s].
 
     Raises:
         InputError: The kind of failure lacks a key, or has one too many.
     """
-    duration = None if table.duration_s is None else max(number(table.duration_s), 0.01)
+    duration = None if table.duration_s is None else max(number("duration_s", table.duration_s), 0.01)
     keys: dict[str, Any] = {"kind": table.kind, "time_s": begins}
     keys["end_s"] = None if duration is None else begins + duration
     for name in ("bias_kt", "rate_deg_s", "power_shp"):
         value = getattr(table, name)
-        keys[name] = None if value is None else number(value)
+        keys[name] = None if value is None else number(name, value)
     for name in ("actuator", "control", "stop"):
         value = getattr(table, name)
-        keys[name] = one(value) if isinstance(value, list) else value
+        keys[name] = one(name, value) if isinstance(value, list) else value
     return faults_of([FaultTable(**keys)])[0]
 
 
@@ -392,7 +424,7 @@ def _number_problems(
     for name in type(table).model_fields:
         value, place = getattr(table, name), f"{key}.{name}"
         allowed = RANGES.get(name)
-        if isinstance(table, PulseDraw) and name == "amount":
+        if isinstance(table, PulseDraw | SignalDraw) and name == "amount":
             largest = LARGEST_PULSES.get(table.channel, LARGEST_SWITCH_DEG_S)
             allowed = (-largest, largest)
         if isinstance(table, FaultDraw) and name == "rate_deg_s":

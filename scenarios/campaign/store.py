@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from pydantic import TypeAdapter
 
-from rtsim.errors import InputError, OutputError
-from rtsim.outside import LARGEST_TEXT, read_arrays, read_bytes, understanding
-from rtsim.whole_file import whole_file, write_whole
+from rtsim.errors import InputError
+from rtsim.outside import understanding
 from scenarios.campaign.chunks import Chunk, ChunkResult
+from scenarios.campaign.kept_folder import KeptFolder
 
 IDENTITY_FILE = "campaign.json"
-LARGEST_PIECE = 200_000_000
-"""Size of the largest piece that is read [bytes]."""
 
 
 class Store:
@@ -34,24 +32,9 @@ class Store:
             InputError: The folder holds another campaign, or does not say which.
             OutputError: It cannot be written.
         """
-        self._folder, self._chunks = folder, folder / "chunks"
+        self._kept = KeptFolder(folder, identity, noun="campaign", pieces="chunks", fresh=fresh)
         self._laws, self._values = len(identity["laws"]), len(identity["metrics"])
-        try:
-            self._chunks.mkdir(parents=True, exist_ok=True)
-            known = None if fresh else self._identity()
-            if known is not None and known != identity:
-                differing = sorted(key for key in {*known, *identity} if known.get(key) != identity.get(key))
-                raise InputError(
-                    f"the folder holds another campaign (it differs in {', '.join(differing)})",
-                    key="--out",
-                    value=str(folder),
-                    mend="give another folder, or --fresh to begin anew",
-                )
-            if fresh:
-                self._clear()
-            self.write(IDENTITY_FILE, json.dumps(identity, indent=1, sort_keys=True).encode())
-        except OSError as error:
-            raise OutputError(f"{folder}: cannot be written: {error.strerror or error}.") from error
+        self._properties = len(identity["properties"])
 
     def load(self, chunk: Chunk) -> ChunkResult | None:
         """Give a piece that is finished, or None; a damaged file counts as not finished.
@@ -59,19 +42,22 @@ class Store:
         Args:
             chunk: The piece.
         """
-        path = self._chunks / _name(chunk)
+        data = self._kept.load(_name(chunk))
+        if data is None:
+            return None
         try:
-            data = read_arrays(path, noun="piece of a campaign", largest=LARGEST_PIECE, mend="fly it again")
-            with understanding("piece of a campaign", file=path, mend="fly it again"):
+            with understanding("piece of a campaign", file=_name(chunk), mend="fly it again"):
                 problems = TypeAdapter(tuple[tuple[int, int, str], ...]).validate_json(str(data["problems"].item()))
                 metrics = data["metrics"].astype(np.float64, casting="same_kind")
+                robustness = data["robustness"].astype(np.float64, casting="same_kind")
                 seconds = data["seconds"].astype(np.float64, casting="same_kind")
         except InputError:
             return None
-        shape = (chunk.count, self._laws, self._values)
-        if metrics.shape != shape or seconds.shape != shape[1:2] or any(law >= self._laws for _, law, _ in problems):
+        shape = (chunk.count, self._laws)
+        fits = metrics.shape == (*shape, self._values) and robustness.shape == (*shape, self._properties)
+        if not fits or seconds.shape != shape[1:] or any(law >= self._laws for _, law, _ in problems):
             return None
-        return ChunkResult(chunk, metrics, problems, seconds)
+        return ChunkResult(chunk, metrics, robustness, problems, seconds)
 
     def save(self, result: ChunkResult) -> None:
         """Keep a finished piece.
@@ -82,44 +68,14 @@ class Store:
         Raises:
             OutputError: It cannot be written.
         """
-        path = self._chunks / _name(result.chunk)
-        with whole_file(path) as temporary, temporary.open("wb") as stream:
-            np.savez(
-                stream,
-                metrics=result.metrics,
-                seconds=result.seconds,
-                problems=np.array(json.dumps(result.problems)),
-            )
-
-    def write(self, name: str, content: bytes) -> Path:
-        """Write a file of the campaign, whole or not at all.
-
-        Args:
-            name: Its name in the folder.
-            content: What it holds.
-
-        Returns:
-            Its path.
-        """
-        path = self._folder / name
-        write_whole(path, content)
-        return path
-
-    def _identity(self) -> Any:
-        """What the folder says of itself; None where nothing is in it."""
-        path, mend = self._folder / IDENTITY_FILE, "give another folder, or --fresh to begin anew"
-        if not path.exists():
-            if not any(self._chunks.glob("*.npz")):
-                return None
-            raise InputError("is missing beside pieces of a campaign", file=str(path), mend=mend)
-        data = read_bytes(path, noun="campaign's identity", largest=LARGEST_TEXT, missing=mend)
-        with understanding("campaign's identity", file=path, mend=mend):
-            return TypeAdapter(dict[str, Any]).validate_python(json.loads(data.decode("utf-8-sig")))
-
-    def _clear(self) -> None:
-        for path in self._chunks.glob("*.npz"):
-            path.unlink()
+        self._kept.save(
+            _name(result.chunk),
+            metrics=result.metrics,
+            robustness=result.robustness,
+            seconds=result.seconds,
+            problems=np.array(json.dumps(result.problems)),
+        )
 
 
 def _name(chunk: Chunk) -> str:
-    return f"class{chunk.class_number:03d}-run{chunk.first:07d}.npz"
+    return f"class{chunk.class_number:03d}-run{chunk.first:07d}"

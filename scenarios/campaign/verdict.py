@@ -13,7 +13,7 @@ from rtsim.arrays import FloatArray
 from rtsim.measures.metric_kernels import METRICS, VALUE
 from scenarios.campaign.chunks import LawVariant
 from scenarios.campaign.events import EVENTS
-from scenarios.campaign.spec import CampaignFile, ExpectRate
+from scenarios.campaign.spec import CampaignFile, ExpectRate, properties_of
 from scenarios.campaign.statistics import Rate, bound_decided, flights_to_bound, mcnemar, quantile, rate
 
 BOOTSTRAP_SEED = 20_000
@@ -30,6 +30,8 @@ class Flights:
     """The laws; the last is ``off``."""
     metrics: tuple[FloatArray, ...]
     """By class: metrics, shape (runs, laws, VALUE.size)."""
+    robustness: tuple[FloatArray, ...]
+    """By class: robustness in the campaign's properties, shape (runs, laws, properties)."""
     planned: tuple[int, ...]
     """By class: runs of the whole campaign."""
 
@@ -53,6 +55,24 @@ class Flights:
             if not classes or item.name in classes
         ]
         return np.concatenate(found).astype(np.float64)
+
+    def broken(self, formula: str, law: int, classes: Sequence[str] = ()) -> tuple[FloatArray, float]:
+        """Whether flights broke a property, as 0 and 1, and the least robustness; inf of none.
+
+        Args:
+            formula: The property.
+            law: Place of the law.
+            classes: Names of the classes; empty for all.
+        """
+        place = properties_of(self.spec).index(formula)
+        found = np.concatenate(
+            [
+                robustness[:, law, place]
+                for item, robustness in zip(self.spec.classes, self.robustness, strict=True)
+                if not classes or item.name in classes
+            ]
+        )
+        return (found < 0.0).astype(np.float64), float(found.min(initial=math.inf))
 
     def runs_planned(self, classes: Sequence[str]) -> int:
         """Flights of the whole campaign in some classes.
@@ -84,7 +104,7 @@ class Judged:
     name: str
     """What was expected, in words."""
     event: str
-    """What was counted."""
+    """What was counted: an event, or flights that broke a property."""
     law: str
     """Of which law."""
     classes: tuple[str, ...]
@@ -95,11 +115,15 @@ class Judged:
     """What was found."""
     held: bool | None
     """Whether it held; None while that is not decided."""
+    robustness: float | None = None
+    """The least robustness in the property; None of an event."""
 
     @property
     def sentence(self) -> str:
         """What to say where it failed."""
-        return f"{self.event} of {self.law}={self.rate.value:.4g} (bound {self.rate.upper:.4g}) want {self.limit}"
+        least = "" if self.robustness is None else f", least robustness {self.robustness:.4g}"
+        found = f"{self.rate.value:.4g} (bound {self.rate.upper:.4g}{least})"
+        return f"{self.event} of {self.law}={found} want {self.limit}"
 
 
 def judge(flights: Flights, *, final: bool) -> list[Judged]:
@@ -114,7 +138,12 @@ def judge(flights: Flights, *, final: bool) -> list[Judged]:
 
 def _judged(flights: Flights, clause: ExpectRate, *, final: bool) -> Judged:
     law = flights.place_of(clause.of)
-    happened = flights.happened(clause.event, law, clause.classes)
+    least = None
+    if clause.property is not None:
+        happened, least = flights.broken(clause.property, law, clause.classes)
+    else:
+        assert clause.event is not None  # the file was checked
+        happened = flights.happened(clause.event, law, clause.classes)
     count, done = int(happened.sum()), len(happened)
     confidence = flights.spec.confidence
     planned = done if final else flights.runs_planned(clause.classes)
@@ -135,12 +164,13 @@ def _judged(flights: Flights, clause: ExpectRate, *, final: bool) -> Judged:
     held = False if False in verdicts else None if None in verdicts else True
     return Judged(
         name=clause.name,
-        event=clause.event,
+        event=clause.event or f"broken: {clause.property}",
         law=flights.laws[law].label,
         classes=tuple(clause.classes),
         limit=" and ".join(words),
         rate=rate(count, done, confidence=confidence),
         held=held,
+        robustness=least,
     )
 
 

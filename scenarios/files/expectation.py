@@ -72,6 +72,22 @@ def range_problems(minimum: float | None, maximum: float | None, *, file: str, k
     return []
 
 
+def property_problems(formula: str, *, file: str, key: str) -> list[InputError]:
+    """Why a formula cannot be asked of a flight.
+
+    Args:
+        formula: The formula.
+    """
+    from rtsim.properties.formula import parse_property  # loads its reader
+
+    try:
+        parse_property(formula)
+    except InputError as error:
+        value = error.value if error.value is not None else formula
+        return [InputError(error.problem, file=file, key=key, value=value, mend=error.mend or "correct it")]
+    return []
+
+
 def name_problems(name: str, known: Collection[str], noun: str, *, file: str, key: str) -> list[InputError]:
     """Whether a clause names something that is not there.
 

@@ -180,9 +180,9 @@ def test_records_of_searches(tmp_path):
 
 def test_pieces_of_campaigns(tmp_path):
     dice, chunk = random.Random(5), Chunk(0, 0, 2)
-    identity = {"laws": ["full", "off"], "metrics": ["a", "b", "c"]}
+    identity = {"laws": ["full", "off"], "metrics": ["a", "b", "c"], "properties": ["p"]}
     store = Store(tmp_path, identity)
-    store.save(ChunkResult(chunk, np.ones((2, 2, 3)), ((0, 1, "late"),), np.zeros(2)))
+    store.save(ChunkResult(chunk, np.ones((2, 2, 3)), np.ones((2, 2, 1)), ((0, 1, "late"),), np.zeros(2)))
     [piece] = (tmp_path / "chunks").iterdir()
     data = piece.read_bytes()
     found = [store.load(chunk) for _ in range(100) if _written(piece, damaged(data, dice))]

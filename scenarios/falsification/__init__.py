@@ -1,0 +1,1 @@
+"""The search for the flight that breaks a law, and for how likely such a flight is."""

@@ -1,0 +1,193 @@
+"""Ways to look for the flight with the least robustness, behind one small interface: ask for points, tell their worth.
+
+``random`` draws flights as a campaign does. ``elites`` keeps the worst flight of every place where a margin can run out
+and varies those that were varied least (MAP-Elites, Mouret and Clune 2015): it goes round the corridor. ``cma-es``
+(pycma) and ``surrogate`` go down from the worst flights found. Every method is a function of its seed and of what it is
+told, so that a search can be repeated, and resumed from its record.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from rtsim.arrays import FloatArray
+from rtsim.optimization.methods import CmaMethod
+from scenarios.falsification.archive import Archive, Elite
+from scenarios.falsification.evaluation import Answer, Query
+from scenarios.falsification.space import ClassSpace
+from scenarios.falsification.surrogate import SurrogateSearch
+
+BATCH = 16
+"""Points of a generation of the methods that have no size of their own."""
+NO_FLIGHT = 1e6
+"""Worth of a point that has no flight: worse than any that has."""
+STEPS = (0.01, 0.05, 0.2)
+"""Standard deviations of a variation, one of them for each."""
+FIRST_STEP = 0.15
+"""First standard deviation of a search that goes down from a flight."""
+PATIENCE, LONGEST = 6, 40
+"""Generations without getting lower, and in all, after which another start is tried."""
+LOWER_BY = 0.02
+"""What counts as getting lower, in units of robustness."""
+FRESH_SHARE = 0.25
+"""Share of the points of ``elites`` that vary nothing but are drawn anew."""
+
+
+class Method(Protocol):
+    """Asks for points and learns from what they are worth."""
+
+    def ask(self) -> list[Query]:
+        """Points of the next generation."""
+        ...
+
+    def tell(self, answers: Sequence[Answer]) -> None:
+        """Learn what became of the points asked for.
+
+        Args:
+            answers: What came of them, in the order of the points.
+        """
+        ...
+
+
+class RandomSearch:
+    """Flights as a campaign draws them, class after class."""
+
+    def __init__(self, spaces: Sequence[ClassSpace], random: np.random.Generator) -> None:
+        """Begin with the first class."""
+        self._spaces, self._random, self._next = spaces, random, 0
+
+    def ask(self) -> list[Query]:
+        """See :class:`Method`."""
+        return [self.draw() for _ in range(BATCH)]
+
+    def draw(self) -> Query:
+        """One flight of the next class."""
+        space = self._spaces[self._next % len(self._spaces)]
+        self._next += 1
+        return Query(space.number, self._random.random(space.size))
+
+    def tell(self, answers: Sequence[Answer]) -> None:
+        """Learn nothing."""
+
+
+class EliteSearch:
+    """Varies the worst flights of the places that were tried least."""
+
+    def __init__(
+        self, spaces: Sequence[ClassSpace], archive: Archive, target: int, random: np.random.Generator
+    ) -> None:
+        """Look at what is flown.
+
+        Args:
+            spaces: The classes.
+            archive: Everything flown.
+            target: Place of the property.
+            random: Source of randomness.
+        """
+        self._fresh = RandomSearch(spaces, random)
+        self._archive, self._target, self._random = archive, target, random
+
+    def ask(self) -> list[Query]:
+        """See :class:`Method`."""
+        elites = list(self._archive.elites[self._target].values()) if self._archive.elites else []
+        fresh = BATCH if not elites else round(FRESH_SHARE * BATCH)
+        return [self._fresh.draw() for _ in range(fresh)] + [self._varied(elites) for _ in range(BATCH - fresh)]
+
+    def _varied(self, elites: list[Elite]) -> Query:
+        """A variation of the elite that was tried least; of those the one that is nearest to breaking."""
+        parent = min(elites, key=lambda elite: (elite.tries, elite.value))
+        parent.tries += 1
+        query = parent.flown.query
+        mates = [elite for elite in elites if elite.flown.query.class_number == query.class_number]
+        vector = query.vector.copy()
+        if len(mates) > 1 and self._random.random() < 0.5:
+            mate = mates[int(self._random.integers(len(mates)))].flown.query.vector
+            vector = np.where(self._random.random(len(vector)) < 0.5, vector, mate)
+        step = STEPS[int(self._random.integers(len(STEPS)))]
+        moved = self._random.random(len(vector)) < max(0.3, 1.0 / max(len(vector), 1))
+        vector = reflected(vector + step * self._random.standard_normal(len(vector)) * moved)
+        return Query(query.class_number, vector)
+
+    def tell(self, answers: Sequence[Answer]) -> None:
+        """Learn from the archive alone."""
+
+
+class DescentSearch:
+    """Goes down from the worst flights found, one start after the other, by CMA-ES or with a surrogate."""
+
+    def __init__(self, kind: str, archive: Archive, target: int, seed: int, spaces: Sequence[ClassSpace]) -> None:
+        """Begin without a start.
+
+        Args:
+            kind: ``cma-es`` or ``surrogate``.
+            archive: Everything flown; starts are its worst flights, each place once.
+            target: Place of the property.
+            seed: Root of its random streams.
+            spaces: The classes.
+        """
+        self._kind, self._archive, self._target, self._seed = kind, archive, target, seed
+        self._spaces = {space.number: space for space in spaces}
+        self._left: set[object] = set()
+        self._starts = 0
+        self._class = 0
+        self._inner: CmaMethod | SurrogateSearch | None = None
+        self._lowest, self._since, self._generations = math.inf, 0, 0
+
+    def ask(self) -> list[Query]:
+        """See :class:`Method`."""
+        if self._inner is None or self._since >= PATIENCE or self._generations >= LONGEST:
+            self._begin()
+        assert self._inner is not None  # begun above
+        return [Query(self._class, vector) for vector in self._inner.ask()]
+
+    def tell(self, answers: Sequence[Answer]) -> None:
+        """See :class:`Method`."""
+        assert self._inner is not None  # asked before
+        values = np.array([one.robustness[self._target] for one in answers])
+        values = np.where(np.isfinite(values), values, NO_FLIGHT)
+        self._inner.tell(values[:, None], np.zeros((len(values), 0)))
+        self._generations += 1
+        lowest = float(values.min())
+        self._since = 0 if lowest < self._lowest - LOWER_BY else self._since + 1
+        self._lowest = min(self._lowest, lowest)
+
+    def _begin(self) -> None:
+        """From the worst flight of the places not begun from yet; once there is none, from all again."""
+        elites = self._archive.elites[self._target]
+        places = [place for place in elites if place not in self._left]
+        if not places:
+            self._left.clear()
+            places = list(elites)
+        place = min(places, key=lambda place: elites[place].value)
+        self._left.add(place)
+        query = elites[place].flown.query
+        self._class = query.class_number
+        size = self._spaces[self._class].size
+        seed = self._seed + self._starts
+        self._starts += 1
+        start = query.vector[None, :]
+        if self._kind == "cma-es" and size > 1:
+            population = 4 + int(3.0 * math.log(size))
+            self._inner = CmaMethod(start, population=population, seed=seed, penalty=False, step=FIRST_STEP)
+        else:
+            known = [one for one in self._archive.flown if one.query.class_number == self._class]
+            self._inner = SurrogateSearch(
+                np.array([one.query.vector for one in known]).reshape(len(known), size),
+                np.array([one.answer.robustness[self._target] for one in known]),
+                centre=query.vector,
+                seed=seed,
+            )
+        self._lowest, self._since, self._generations = elites[place].value, 0, 0
+
+
+def reflected(vector: FloatArray) -> FloatArray:
+    """Bring a point back into the unit cube by mirrors at its sides.
+
+    Args:
+        vector: The point.
+    """
+    return np.asarray(1.0 - np.abs(1.0 - np.mod(np.abs(vector), 2.0)), dtype=np.float64)

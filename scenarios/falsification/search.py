@@ -1,0 +1,168 @@
+"""Looks for the flight that breaks a law: generations asked, flown, kept and told, until something breaks."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, get_args
+
+from rtsim.random_streams import STREAM_SEARCH, stream_generator
+from scenarios.campaign.chunks import Task, task_spec
+from scenarios.falsification.archive import Archive, Flown
+from scenarios.falsification.evaluation import Answer, Query
+from scenarios.falsification.methods import DescentSearch, EliteSearch, Method, RandomSearch
+from scenarios.falsification.record import Record
+from scenarios.falsification.space import ClassSpace, class_spaces
+
+MethodName = Literal["mixed", "elites", "cma-es", "surrogate", "random"]
+METHODS: tuple[MethodName, ...] = get_args(MethodName)
+"""Methods by name; ``mixed`` takes the others in turns."""
+TURNS: tuple[MethodName, ...] = ("elites", "cma-es", "elites", "surrogate")
+"""Turns of ``mixed``, after the first generations."""
+FIRST_PER_CLASS = 4
+"""Flights of every class that are drawn before anything is varied."""
+MOST_WITHOUT_START = 20
+"""Points tried for each flight of the budget, where most have no start."""
+
+
+class Flyer(Protocol):
+    """Flies points, here or elsewhere, and gives the answers in their order."""
+
+    def __call__(self, queries: Sequence[Query]) -> list[Answer]:
+        """Fly.
+
+        Args:
+            queries: The points.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a search has come."""
+
+    flights: int
+    """Flights under test."""
+    budget: int
+    """Flights under test that may be flown."""
+    least: tuple[float, ...]
+    """Least robustness so far, by property."""
+
+
+@dataclass(eq=False)
+class SearchResult:
+    """What a search found."""
+
+    archive: Archive
+    """Everything flown."""
+    stopped_by: BaseException | None = None
+    """Ctrl-C or SIGTERM, for the caller to raise again once all is safe."""
+    reused: int = 0
+    """Generations that came from the record."""
+    cpu_s: float = 0.0
+    """CPU time of the flights [s]."""
+    wall_s: float = 0.0
+    """Wall time [s]."""
+    problems: list[tuple[Flown, str]] = field(default_factory=list)
+    """Flights in which the law failed by itself."""
+
+
+def run_search(
+    task: Task,
+    flyer: Flyer,
+    *,
+    budget: int,
+    method: MethodName = "mixed",
+    keep_on: bool = False,
+    record: Record | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> SearchResult:
+    """Search.
+
+    Args:
+        task: What flies and what is asked of it.
+        flyer: Who flies.
+        budget: Flights under test.
+        method: How to look.
+        keep_on: Go on for the least robustness when all properties are broken.
+        record: What was flown before, and where it is kept; None keeps nothing.
+        on_progress: Told after each generation.
+
+    Returns:
+        What was found: the same for any flyer, and after any interruption.
+
+    Raises:
+        InputError: The record does not follow from the task.
+        OutputError: The record cannot be written.
+    """
+    spec = task_spec(task.text, task.file)
+    spaces = class_spaces(spec)
+    archive = Archive([item.duration_s or spec.duration_s for item in spec.classes])
+    result = SearchResult(archive)
+    plan = _Plan(task, method, archive, spaces)
+    begin, number = time.perf_counter(), 0
+    try:
+        while len(archive.flown) < budget and archive.without_start < MOST_WITHOUT_START * budget:
+            targets = (
+                [k for k in range(len(task.properties)) if keep_on or not archive.first_broken(k)]
+                if archive.flown
+                else [0]
+            )
+            if not targets:
+                break
+            current = plan.method(number, targets)
+            queries = current.ask()[: budget - len(archive.flown)] if method == "random" else current.ask()
+            answers = None if record is None else record.answers(number, queries)
+            if answers is None:
+                answers = flyer(queries)
+                if record is not None:
+                    record.keep(number, queries, answers)
+            else:
+                result.reused += 1
+            before = len(archive.flown)
+            archive.add(queries, answers)
+            current.tell(answers)
+            result.cpu_s += sum(answer.seconds for answer in answers)
+            result.problems += [(one, one.answer.problem) for one in archive.flown[before:] if one.answer.problem]
+            number += 1
+            if on_progress is not None:
+                least = tuple(archive.least(k) for k in range(len(task.properties)))
+                on_progress(Progress(len(archive.flown), budget, least))
+    except (KeyboardInterrupt, SystemExit) as stop:
+        if not archive.flown:
+            raise
+        result.stopped_by = stop
+    result.wall_s = time.perf_counter() - begin
+    return result
+
+
+class _Plan:
+    """Whose turn it is."""
+
+    def __init__(self, task: Task, method: MethodName, archive: Archive, spaces: Sequence[ClassSpace]) -> None:
+        self._task, self._name, self._archive, self._spaces = task, method, archive, spaces
+        random = stream_generator(task.seed, STREAM_SEARCH, 1)
+        self._first = RandomSearch(spaces, random)
+        self._methods: dict[tuple[MethodName, int], Method] = {}
+        self._first_flights = FIRST_PER_CLASS * len(spaces)
+        self._begun = 0
+
+    def method(self, number: int, targets: Sequence[int]) -> Method:
+        """The method of a generation, for one of the properties that are not broken yet."""
+        if self._name == "random" or len(self._archive.flown) < self._first_flights:
+            self._begun = number + 1
+            return self._first
+        turn = number - self._begun
+        name: MethodName = self._name if self._name != "mixed" else TURNS[(turn // len(targets)) % len(TURNS)]
+        target = targets[turn % len(targets)]
+        if (name, target) not in self._methods:
+            self._methods[name, target] = self._made(name, target)
+        return self._methods[name, target]
+
+    def _made(self, name: MethodName, target: int) -> Method:
+        branch = 2 + METHODS.index(name) + len(METHODS) * target
+        random = stream_generator(self._task.seed, STREAM_SEARCH, branch)
+        if name == "elites":
+            return EliteSearch(self._spaces, self._archive, target, random)
+        return DescentSearch(name, self._archive, target, int(random.integers(2**40)), self._spaces)
