@@ -9,9 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from rtsim.errors import InputError, suggestion
+
+ROBUSTNESS = "robustness"
+"""What is measured of a property: how far the flight is from breaking it, in the unit of what decides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +31,8 @@ class Expectation:
     """Largest value that holds."""
     of: Literal["law", "off", "difference"] = "law"
     """Whose value: the flight's, its unprotected twin's, or the first minus the second."""
+    formula: str = ""
+    """A property in signal temporal logic; its robustness is what is measured, and ``metric`` is :data:`ROBUSTNESS`."""
 
     @property
     def limit(self) -> float | list[float]:
@@ -57,6 +62,59 @@ class Expectation:
         return low and (self.maximum is None or value <= self.maximum)
 
 
+def clause_of(
+    name: str, metric: str | None, formula: str | None, low: float | None, high: float | None, **whose: Any
+) -> Expectation:
+    """Make a clause of what a checked table says.
+
+    Args:
+        name: What is expected, in words.
+        metric: The metric, or None.
+        formula: The property, or None; without limits it must not be broken.
+        low: Smallest value that holds.
+        high: Largest value that holds.
+        whose: ``of``, where it is not the flight's.
+    """
+    if formula is None:
+        assert metric is not None  # the table was checked
+        return Expectation(name, metric, low, high, **whose)
+    low = 0.0 if low is None and high is None else low
+    return Expectation(name, ROBUSTNESS, low, high, formula=formula, **whose)
+
+
+def clause_problems(
+    metric: str | None,
+    formula: str | None,
+    low: float | None,
+    high: float | None,
+    *,
+    known: Collection[str],
+    noun: str,
+    twin: bool,
+    file: str,
+    key: str,
+) -> list[InputError]:
+    """Mistakes in what a clause measures and allows.
+
+    Args:
+        metric: The metric, or None.
+        formula: The property, or None.
+        low: Smallest value that holds.
+        high: Largest value that holds.
+        known: Metrics that there are.
+        noun: What they are called, with the article.
+        twin: Whether the flight has an unprotected twin.
+    """
+    if (metric is None) == (formula is None):
+        return [InputError("needs either metric or property", file=file, key=key, mend="give one of them")]
+    if formula is not None:
+        limits = range_problems(low or 0.0, high, file=file, key=key)
+        return property_problems(formula, twin=twin, file=file, key=f"{key}.property") + limits
+    assert metric is not None  # one of them
+    found = name_problems(metric, known, noun, file=file, key=f"{key}.metric")
+    return found + range_problems(low, high, file=file, key=key)
+
+
 def range_problems(minimum: float | None, maximum: float | None, *, file: str, key: str) -> list[InputError]:
     """Mistakes in the range of a clause: none at all, or its ends the wrong way round.
 
@@ -72,16 +130,20 @@ def range_problems(minimum: float | None, maximum: float | None, *, file: str, k
     return []
 
 
-def property_problems(formula: str, *, file: str, key: str) -> list[InputError]:
+def property_problems(formula: str, *, twin: bool = True, file: str, key: str) -> list[InputError]:
     """Why a formula cannot be asked of a flight.
 
     Args:
         formula: The formula.
+        twin: Whether the flight has an unprotected twin.
     """
     from rtsim.properties.formula import parse_property  # loads its reader
 
     try:
-        parse_property(formula)
+        if parse_property(formula).needs_twin and not twin:
+            mend = "ask it in [[trial.expect]], or leave twin_ out"
+            problem = "speaks of a twin without a law, which a flight by itself has not"
+            return [InputError(problem, file=file, key=key, value=formula, mend=mend)]
     except InputError as error:
         value = error.value if error.value is not None else formula
         return [InputError(error.problem, file=file, key=key, value=value, mend=error.mend or "correct it")]

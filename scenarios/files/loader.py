@@ -18,7 +18,7 @@ from rtsim.strict import Examined
 from rtsim.toml_file import named_text, parse_toml, shipped_names
 from rtsim.units import deg, kt
 from scenarios.files.disturbances import air_of, disturbance_problems, faults_of
-from scenarios.files.expectation import Expectation, name_problems, range_problems
+from scenarios.files.expectation import clause_of, clause_problems
 from scenarios.files.nacelle_laws import automatic_problems, automatic_settings
 from scenarios.files.scenario import DEFAULT_ALTITUDE, START_CONDITIONS, Scenario, ScenarioEvent
 from scenarios.files.schema import TURN_KEYS, PointTable, ProgrammeTable, ScenarioFile, StartTable
@@ -133,8 +133,17 @@ def _expectation_contradictions(content: ScenarioFile, file: str) -> list[InputE
         from rtsim.measures.metrics import METRIC_NAMES  # loads compiled code
 
         key = f"expect[{number}]"
-        found += name_problems(clause.metric, METRIC_NAMES, "a metric", file=file, key=f"{key}.metric")
-        found += range_problems(clause.min, clause.max, file=file, key=key)
+        found += clause_problems(
+            clause.metric,
+            clause.property,
+            clause.min,
+            clause.max,
+            known=METRIC_NAMES,
+            noun="a metric",
+            twin=False,
+            file=file,
+            key=key,
+        )
     return found
 
 
@@ -236,12 +245,13 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
             ScenarioEvent(event.time_s, event.pilot) for event in sorted(content.events, key=lambda event: event.time_s)
         ),
         expectations=tuple(
-            Expectation(clause.name, clause.metric, clause.min, clause.max) for clause in content.expect
+            clause_of(clause.name, clause.metric, clause.property, clause.min, clause.max) for clause in content.expect
         ),
         source=text,
         file=file,
         automatic=automatic_settings(content.automatic),
         pulses=pulses_of(content.pulses),
+        reaction=content.reaction_s,
         trial=trial_of(content.trial, given(content.flight).get("protection")),
     )
 

@@ -66,6 +66,8 @@ class Scenario:
     """Settings of the automatic nacelle control."""
     pulses: tuple[Pulse, ...] = ()
     """What scripted hands do to the controls besides the pilot."""
+    reaction: float | None = None
+    """A pilot who yields: how long a warning lasts before he gives up his plan [s]; None: he never does."""
     trial: Trial | None = None
     """What makes it a test of envelope protection; None where it is none."""
 

@@ -145,10 +145,11 @@ class EventTable(Strict):
 
 
 class ExpectTable(Strict):
-    """One of ``[[expect]]``: a metric of the flight and its limits; the unit is in the metric's name."""
+    """One of ``[[expect]]``: a metric of the flight or the robustness of a property, and its limits."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
-    metric: str
+    metric: str | None = None
+    property: str | None = None
     min: Annotated[float, Field(allow_inf_nan=False)] | None = None
     max: Annotated[float, Field(allow_inf_nan=False)] | None = None
 
@@ -162,6 +163,7 @@ class ScenarioFile(Strict):
     description: str = ""
     duration_s: Annotated[float, Field(gt=0.0, le=36_000.0, allow_inf_nan=False)] | None = None
     flight: FlightTable = FlightTable()  # made from the options' declaration
+    reaction_s: Annotated[float, Field(ge=0.0, le=3600.0, allow_inf_nan=False)] | None = None
     start: StartTable = StartTable()
     programme: ProgrammeTable | None = None
     automatic: AutomaticTable | None = None

@@ -9,7 +9,7 @@ from typing import Any, Literal
 from rtsim.errors import InputError
 from rtsim.loop.script import Pulse
 from rtsim.units import deg
-from scenarios.files.expectation import Expectation, name_problems, range_problems
+from scenarios.files.expectation import Expectation, clause_of, clause_problems
 from scenarios.files.trial_schema import PulseTable, TrialTable
 
 TrialKind = Literal["nominal", "misuse", "failure", "unprotectable"]
@@ -101,8 +101,17 @@ def _test_problems(trial: TrialTable, *, has_events: bool, flight: Mapping[str, 
         from rtsim.measures.metrics import TRIAL_METRICS  # loads compiled code
 
         key = f"trial.expect[{number}]"
-        found += name_problems(clause.metric, TRIAL_METRICS, "a metric of trials", file=file, key=f"{key}.metric")
-        found += range_problems(clause.min, clause.max, file=file, key=key)
+        found += clause_problems(
+            clause.metric,
+            clause.property,
+            clause.min,
+            clause.max,
+            known=TRIAL_METRICS,
+            noun="a metric of trials",
+            twin=True,
+            file=file,
+            key=key,
+        )
     return found
 
 
@@ -121,7 +130,9 @@ def trial_of(table: TrialTable | None, protection: str | None = None) -> Trial |
         off_leaves=tuple(table.off_leaves),
         off_depth_kt=table.off_depth_kt,
         no_harm_height=table.no_harm_height_m,
-        clauses=tuple(Expectation(item.name, item.metric, item.min, item.max, item.of) for item in table.expect),
+        clauses=tuple(
+            clause_of(item.name, item.metric, item.property, item.min, item.max, of=item.of) for item in table.expect
+        ),
     )
 
 

@@ -26,10 +26,11 @@ class PulseTable(Strict):
 
 
 class TrialExpectTable(Strict):
-    """One of ``[[trial.expect]]``: a metric of the trial and its limits; the unit is in the metric's name."""
+    """One of ``[[trial.expect]]``: a metric of the trial or the robustness of a property, and its limits."""
 
     name: Annotated[str, Field(min_length=1, max_length=200)]
-    metric: str
+    metric: str | None = None
+    property: str | None = None
     of: Literal["law", "off", "difference"] = "law"
     min: Finite | None = None
     max: Finite | None = None

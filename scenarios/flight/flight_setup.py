@@ -35,6 +35,7 @@ def flight_setup(scenario: Scenario) -> FlightSetup:
         air=scenario.air,
         faults=scenario.faults,
         pulses=scenario.pulses,
+        reaction=scenario.reaction,
         automatic_nacelle=automatic_nacelle(scenario.options.nacelle, scenario.automatic, scenario.programme),
     )
 

@@ -11,6 +11,7 @@ from rtsim.errors import OutputError, closest
 from rtsim.frame import SIGNAL_NAMES, SIGNALS
 from rtsim.measures.metrics import FlightMetrics
 from rtsim.realtime.report import Spread, TimingReport
+from scenarios.files.expectation import Expectation
 from scenarios.files.scenario import Scenario
 from telemetry.log.format import LogEvent
 
@@ -136,12 +137,13 @@ def _spread(spread: Spread | None, *names: str) -> dict[str, float | None]:
 
 
 def judge(
-    scenario: Scenario, metrics: FlightMetrics | None, *, completed: bool, end_reason: str
+    scenario: Scenario, metrics: FlightMetrics | None, rows: FloatArray, *, completed: bool, end_reason: str
 ) -> tuple[Verdict, ...]:
     """Judge a flight by its scenario's expectations; being completed is the first of them.
 
     Args:
         metrics: What was measured.
+        rows: The frame history.
         completed: Whether it was flown to its end.
         end_reason: Why it ended.
     """
@@ -150,6 +152,22 @@ def judge(
     whole = "the flight is completed" if completed else f"the flight is completed ({end_reason})"
     verdicts = [Verdict(whole, completed, completed, True)]
     for clause in scenario.expectations:
-        value = metrics.value(clause.metric) if metrics is not None else None
+        value = None if metrics is None else clause_value(clause, metrics, rows, 1.0 / scenario.options.rate_hz)
         verdicts.append(Verdict(clause.name, clause.holds(value), value, clause.limit, clause.metric))
     return tuple(verdicts)
+
+
+def clause_value(clause: Expectation, metrics: FlightMetrics, rows: FloatArray, dt: float) -> float | None:
+    """What a clause of ``[[expect]]`` measures of a flight: a metric, or the robustness of a property.
+
+    Args:
+        clause: The clause.
+        metrics: What was measured.
+        rows: The frame history.
+        dt: Length of a frame [s].
+    """
+    if not clause.formula:
+        return metrics.value(clause.metric)
+    from rtsim.properties.formula import Flown, parse_property  # loads its reader
+
+    return parse_property(clause.formula).robustness(Flown(rows, metrics.numbers), dt).value

@@ -330,7 +330,7 @@ def _measure(
         # A flight that was stopped by hand has not failed what it was never flown to.
         verdicts=()
         if timing.ending == "stopped"
-        else judge(scenario, metrics, completed=completed, end_reason=timing.end_reason),
+        else judge(scenario, metrics, rows, completed=completed, end_reason=timing.end_reason),
         database_hash=database_hash,
         watched=watched,
     )

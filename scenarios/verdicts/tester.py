@@ -16,12 +16,15 @@ from rtsim.frame import SIGNAL_COUNT, history_sha256
 from rtsim.loop.aircraft import database_of
 from rtsim.loop.options import FlightOptions
 from rtsim.measures.metrics import FlightMetrics, TrialMetrics
-from scenarios.campaign.chunks import LawVariant, fly_law, law_chain, present_folder
+from rtsim.properties.formula import parse_property
+from scenarios.campaign.chunks import LawVariant, flown_of, fly_law, law_chain, present_folder
 from scenarios.campaign.events import new_violations
 from scenarios.campaign.trial import TRIAL_CORRIDOR, Bench, FlightPlan, TrialFlight
+from scenarios.files.expectation import Expectation
 from scenarios.files.scenario import Scenario
 from scenarios.files.trial import Trial
 from scenarios.flight.flight_setup import flight_setup
+from scenarios.flight.result import clause_value
 
 LAW_CLAUSE = "law"
 """Metric of the clause that the law runs without failing."""
@@ -201,8 +204,8 @@ class Tester:
         findings = [
             *_law_findings(flown),
             *_default_findings(trial, flown.metrics, off.metrics),
-            *_clause_findings(trial, flown.metrics, off.metrics),
-            *_flight_findings(scenario, FlightMetrics(flown.metrics.numbers)),
+            *_clause_findings(scenario, trial, flown, off),
+            *_flight_findings(scenario, flown),
         ]
         return Case(
             scenario=scenario,
@@ -328,23 +331,29 @@ def _default_findings(trial: Trial, law: TrialMetrics, off: TrialMetrics) -> lis
     return found
 
 
-def _clause_findings(trial: Trial, law: TrialMetrics, off: TrialMetrics) -> list[Finding]:
+def _clause_findings(scenario: Scenario, trial: Trial, flown: TrialFlight, off: TrialFlight) -> list[Finding]:
     found = []
     for clause in trial.clauses:
-        value = (
-            {"law": law, "off": off}[clause.of][clause.metric]
-            if clause.of != "difference"
-            else (law[clause.metric] - off[clause.metric])
-        )
+        of_law, of_off = (_measured(clause, flight, off, scenario) for flight in (flown, off))
+        value = {"law": of_law, "off": of_off, "difference": of_law - of_off}[clause.of]
         metric = clause.metric if clause.of == "law" else f"{clause.of}.{clause.metric}"
         found.append(Finding(clause.name, metric, clause.holds(value), value, clause.words))
     return found
 
 
-def _flight_findings(scenario: Scenario, metrics: FlightMetrics) -> list[Finding]:
+def _measured(clause: Expectation, flight: TrialFlight, off: TrialFlight, scenario: Scenario) -> float:
+    """What a clause of a trial measures of one of its two flights."""
+    if not clause.formula:
+        return flight.metrics[clause.metric]
+    dt = 1.0 / scenario.options.rate_hz
+    return parse_property(clause.formula).robustness(flown_of(flight), dt, flown_of(off)).value
+
+
+def _flight_findings(scenario: Scenario, flown: TrialFlight) -> list[Finding]:
     """The scenario's ``[[expect]]`` clauses, of the protected flight."""
     found = []
+    metrics, dt = FlightMetrics(flown.metrics.numbers), 1.0 / scenario.options.rate_hz
     for clause in scenario.expectations:
-        value = metrics.value(clause.metric)
+        value = clause_value(clause, metrics, flown.rows, dt)
         found.append(Finding(clause.name, clause.metric, clause.holds(value), value, clause.words))
     return found
