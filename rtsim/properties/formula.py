@@ -17,6 +17,8 @@ from rtsim.errors import InputError
 from rtsim.properties.robustness import Evaluator, Trace, check_window
 from rtsim.properties.words import TWIN, check_names, unit_of, values_of
 
+LATER_S = 4.0
+"""Time after which a flight is what was made of it [s]."""
 LARGEST_FORMULA = 2000
 """Characters of the longest formula that is read; what reads it goes into itself for every bracket."""
 
@@ -33,6 +35,9 @@ class Robustness:
     """When it decides [s]; the first time where it does so twice."""
     decides: str
     """The comparison that decides, in words."""
+    later: float
+    """Robustness from ``LATER_S`` on, or of the last frame: what is near to breaking at the start says little of what
+    comes of it."""
 
     @property
     def broken(self) -> bool:
@@ -94,12 +99,13 @@ class Property:
             InputError: The formula speaks of a twin and there is none.
         """
         trace = self._trace(flight, dt, twin)
-        value = float(Evaluator().visit(self.tree, trace)[0])
+        over_time = Evaluator().visit(self.tree, trace)
+        value, later = float(over_time[0]), float(over_time[min(round(LATER_S / dt), trace.frames - 1)])
         for node, found in trace.predicates:
             places = np.flatnonzero(np.abs(found) == abs(value))
             if places.size:
-                return Robustness(value, _unit(node, self.formula), float(places[0]) * dt, _words(node))
-        return Robustness(value, "", 0.0, self.formula)
+                return Robustness(value, _unit(node, self.formula), float(places[0]) * dt, _words(node), later)
+        return Robustness(value, "", 0.0, self.formula, later)
 
     def over_time(self, flight: Flown, dt: float, twin: Flown | None = None) -> FloatArray:
         """Robustness of what stands behind the outermost ``always``, over time, shape (frames,): for plots.

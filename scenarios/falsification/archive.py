@@ -1,4 +1,4 @@
-"""Everything a search has flown, and the worst flight of every place where a margin can run out."""
+"""Everything a search has flown, and the worst flight of every situation that the law was in."""
 
 from __future__ import annotations
 
@@ -9,13 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rtsim.arrays import FloatArray
-from scenarios.falsification.evaluation import Answer, Query
-
-NACELLE_BIN_DEG, TIME_BINS = 7.5, 4
-"""Places where margins run out are told apart by nacelle angle and by part of the flight."""
-
-Place = tuple[int, bool, int, int]
-"""Class, side of the corridor, bin of the nacelle angle, part of the flight."""
+from scenarios.falsification.evaluation import SITUATIONS, Answer, Query
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,30 +24,18 @@ class Flown:
     """Flights under test before it."""
 
 
-@dataclass(slots=True, eq=False)
-class Elite:
-    """The worst flight of a place."""
-
-    flown: Flown
-    """The flight."""
-    value: float
-    """Its robustness."""
-    tries: int = 0
-    """How often something was tried from it since it was found."""
-
-
 @dataclass(eq=False)
 class Archive:
     """What was flown, in order."""
 
-    durations: Sequence[float]
-    """Length of the flights of every class [s]."""
     flown: list[Flown] = field(default_factory=list)
     """Every point that had a flight."""
     without_start: int = 0
     """Points that had none."""
-    elites: list[dict[Place, Elite]] = field(default_factory=list)
-    """Worst flight of every place, by property."""
+    visits: FloatArray = field(default_factory=lambda: np.zeros(SITUATIONS))
+    """Flights that were in each situation near a side of the corridor, shape (SITUATIONS,)."""
+    elites: list[dict[int, Flown]] = field(default_factory=list)
+    """By property and situation: the flight that is nearest to breaking."""
 
     def add(self, queries: Sequence[Query], answers: Sequence[Answer]) -> None:
         """Take what came of points.
@@ -70,20 +52,13 @@ class Archive:
             self.flown.append(flown)
             if not self.elites:
                 self.elites = [{} for _ in answer.robustness]
-            place = self.place_of(flown)
-            for elites, value in zip(self.elites, answer.robustness.tolist(), strict=True):
-                if place not in elites or value < elites[place].value:
-                    elites[place] = Elite(flown, value)
-
-    def place_of(self, flown: Flown) -> Place:
-        """Where the corridor's margin was least.
-
-        Args:
-            flown: A flight.
-        """
-        answer, number = flown.answer, flown.query.class_number
-        part = min(int(TIME_BINS * answer.time_s / self.durations[number]), TIME_BINS - 1)
-        return number, answer.high, int(answer.nacelle_deg // NACELLE_BIN_DEG), part
+            bits = np.unpackbits(np.frombuffer(answer.exercised, dtype=np.uint8))[:SITUATIONS]
+            self.visits += bits
+            for place, elites in enumerate(self.elites):
+                for situation in np.flatnonzero(bits).tolist():
+                    known = elites.get(situation)
+                    if known is None or answer.guidance[place] < known.answer.guidance[place]:
+                        elites[situation] = flown
 
     def robustness(self, place: int) -> FloatArray:
         """Robustness of every flight in a property, in order, shape (flights,).

@@ -6,6 +6,7 @@ import functools
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -20,6 +21,14 @@ from scenarios.falsification.space import ClassSpace, class_spaces
 
 NACELLE_STEP_DEG, AIRSPEED_STEP_KT = 5.0, 10.0
 """Size of a cell of the corridor in the account of what was flown."""
+NEAR_KT = (6.0, 10.0)
+"""Margins below which a law is near a side of the corridor [kn]."""
+NEAR_NACELLE_DEG = 2.5
+"""Nacelle angles that differ by more are another situation."""
+QUARTERS = 4
+"""Parts of a flight, each another situation."""
+SITUATIONS = 2 * len(NEAR_KT) * QUARTERS * 37
+"""Side, nearness, part of the flight, nacelle angle."""
 NACELLE_CELLS, AIRSPEED_CELLS = 19, 26
 """Cells from 0 to 90 deg, and from 0 to 260 kn."""
 
@@ -40,6 +49,8 @@ class Answer:
 
     robustness: FloatArray
     """By property; inf where there is no such flight, since its start has no trim or lies outside."""
+    guidance: FloatArray
+    """What a search goes down by: the robustness where it is broken, else that of the flight after its start."""
     flights: int
     """Flights flown for it: 0, 1, or 2 with the twin."""
     nacelle_deg: float
@@ -54,10 +65,24 @@ class Answer:
     """Whether that was on the high-speed side."""
     cells: bytes
     """Cells of the corridor that were flown through, a bit for each."""
+    exercised: bytes
+    """Situations near a side of the corridor that the law was in, a bit for each."""
     problem: str
     """What the law did wrong by itself; empty where it ran."""
     seconds: float
     """CPU time [s]."""
+
+
+class Flyer(Protocol):
+    """Flies points, here or elsewhere, and gives the answers in their order."""
+
+    def __call__(self, queries: Sequence[Query]) -> list[Answer]:
+        """Fly.
+
+        Args:
+            queries: The points.
+        """
+        ...
 
 
 def fly_points(task: Task, queries: Sequence[Query]) -> list[Answer]:
@@ -96,17 +121,18 @@ def _fly(
         plan = space.plan(spec, query.vector, task.options)
     except NoStart:
         nothing = np.full(len(properties), np.inf)
-        return Answer(nothing, 0, 0.0, 0.0, 0.0, 0.0, False, b"", "", time.process_time() - begin)
+        return Answer(nothing, nothing, 0, 0.0, 0.0, 0.0, 0.0, False, b"", b"", "", time.process_time() - begin)
     twin = twin_of(bench, plan, properties)
     flight = fly_law(bench, plan, task.laws[0], folder=task.folder)
     dt = 1.0 / plan.setup.options.rate_hz
     flown = flown_of(flight)
-    robustness = np.array([one.robustness(flown, dt, twin).value for one in properties])
+    found = [one.robustness(flown, dt, twin) for one in properties]
     rows = flight.rows
     least = int(np.argmin(rows[:, COLUMN.margin_kt]))
     row = rows[least]
     return Answer(
-        robustness=robustness,
+        robustness=np.array([one.value for one in found]),
+        guidance=np.array([one.value if one.broken else max(one.later, one.value) for one in found]),
         flights=1 if twin is None else 2,
         nacelle_deg=float(row[COLUMN.nacelle_deg]),
         airspeed_kt=float(row[COLUMN.airspeed_kt]),
@@ -114,6 +140,7 @@ def _fly(
         margin_kt=float(row[COLUMN.margin_kt]),
         high=bool(row[COLUMN.margin_high_kt] < row[COLUMN.margin_low_kt]),
         cells=cells_of(rows),
+        exercised=exercised(rows, plan.duration),
         problem="; ".join(flight.law_problems),
         seconds=time.process_time() - begin,
     )
@@ -129,4 +156,22 @@ def cells_of(rows: FloatArray) -> bytes:
     airspeed = np.clip(rows[:, COLUMN.airspeed_kt] // AIRSPEED_STEP_KT, 0, AIRSPEED_CELLS - 1)
     seen = np.zeros((NACELLE_CELLS, AIRSPEED_CELLS), dtype=np.bool_)
     seen[nacelle.astype(np.int64), airspeed.astype(np.int64)] = True
+    return np.packbits(seen).tobytes()
+
+
+def exercised(rows: FloatArray, duration: float) -> bytes:
+    """Situations near a side of the corridor that a flight was in, one bit each.
+
+    Args:
+        rows: Its history.
+        duration: Length of the whole flight [s].
+    """
+    margin = rows[:, COLUMN.margin_kt]
+    near = rows[margin < NEAR_KT[-1]]
+    nearness = np.searchsorted(NEAR_KT, near[:, COLUMN.margin_kt], side="right")
+    high = near[:, COLUMN.margin_high_kt] < near[:, COLUMN.margin_low_kt]
+    quarter = np.minimum(QUARTERS * near[:, COLUMN.time_s] / duration, QUARTERS - 1).astype(np.int64)
+    nacelle = np.clip(near[:, COLUMN.nacelle_deg] / NEAR_NACELLE_DEG, 0.0, 36.0).astype(np.int64)
+    seen = np.zeros((2, len(NEAR_KT), QUARTERS, 37), dtype=np.bool_)
+    seen[high.astype(np.int64), nearness, quarter, nacelle] = True
     return np.packbits(seen).tobytes()

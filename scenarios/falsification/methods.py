@@ -1,9 +1,10 @@
 """Ways to look for the flight with the least robustness, behind one small interface: ask for points, tell their worth.
 
-``random`` draws flights as a campaign does. ``elites`` keeps the worst flight of every place where a margin can run out
-and varies those that were varied least (MAP-Elites, Mouret and Clune 2015): it goes round the corridor. ``cma-es``
-(pycma) and ``surrogate`` go down from the worst flights found. Every method is a function of its seed and of what it is
-told, so that a search can be repeated, and resumed from its record.
+``random`` draws flights as a campaign does. ``situations`` keeps the flight nearest to breaking of every situation near
+a side of the corridor and varies those of the rarest (as fuzzers go after rare branches, and MAP-Elites, Mouret and
+Clune 2015): it goes round the corridor. ``cma-es`` (pycma) and ``surrogate`` go down from the flights nearest to
+breaking. Every method is a function of its seed and of what it is told, so that a search can be repeated, and resumed
+from its record.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.optimization.methods import CmaMethod
-from scenarios.falsification.archive import Archive, Elite
-from scenarios.falsification.evaluation import Answer, Query
+from scenarios.falsification.archive import Archive, Flown
+from scenarios.falsification.evaluation import SITUATIONS, Answer, Query
 from scenarios.falsification.space import ClassSpace
 from scenarios.falsification.surrogate import SurrogateSearch
 
@@ -34,7 +35,9 @@ PATIENCE, LONGEST = 6, 40
 LOWER_BY = 0.02
 """What counts as getting lower, in units of robustness."""
 FRESH_SHARE = 0.25
-"""Share of the points of ``elites`` that vary nothing but are drawn anew."""
+"""Share of the points of ``situations`` that vary nothing but are drawn anew."""
+MATING = 0.3
+"""Share of its points that take coordinates from a second flight of their class."""
 
 
 class Method(Protocol):
@@ -74,8 +77,8 @@ class RandomSearch:
         """Learn nothing."""
 
 
-class EliteSearch:
-    """Varies the worst flights of the places that were tried least."""
+class SituationSearch:
+    """Varies flights that were in the situations the law was in least often (coverage-guided, as a fuzzer does)."""
 
     def __init__(
         self, spaces: Sequence[ClassSpace], archive: Archive, target: int, random: np.random.Generator
@@ -90,22 +93,24 @@ class EliteSearch:
         """
         self._fresh = RandomSearch(spaces, random)
         self._archive, self._target, self._random = archive, target, random
+        self._tried = np.zeros(SITUATIONS)
 
     def ask(self) -> list[Query]:
         """See :class:`Method`."""
-        elites = list(self._archive.elites[self._target].values()) if self._archive.elites else []
+        elites = self._archive.elites[self._target] if self._archive.elites else {}
         fresh = BATCH if not elites else round(FRESH_SHARE * BATCH)
         return [self._fresh.draw() for _ in range(fresh)] + [self._varied(elites) for _ in range(BATCH - fresh)]
 
-    def _varied(self, elites: list[Elite]) -> Query:
-        """A variation of the elite that was tried least; of those the one that is nearest to breaking."""
-        parent = min(elites, key=lambda elite: (elite.tries, elite.value))
-        parent.tries += 1
-        query = parent.flown.query
-        mates = [elite for elite in elites if elite.flown.query.class_number == query.class_number]
+    def _varied(self, elites: dict[int, Flown]) -> Query:
+        """A variation of the flight nearest to breaking in the situation that was visited and tried least."""
+        rarity = self._archive.visits + self._tried
+        situation = min(elites, key=lambda one: (rarity[one], elites[one].answer.guidance[self._target], one))
+        self._tried[situation] += 1.0
+        query = elites[situation].query
         vector = query.vector.copy()
-        if len(mates) > 1 and self._random.random() < 0.5:
-            mate = mates[int(self._random.integers(len(mates)))].flown.query.vector
+        mates = [one.query.vector for one in elites.values() if one.query.class_number == query.class_number]
+        if self._random.random() < MATING:
+            mate = mates[int(self._random.integers(len(mates)))]
             vector = np.where(self._random.random(len(vector)) < 0.5, vector, mate)
         step = STEPS[int(self._random.integers(len(STEPS)))]
         moved = self._random.random(len(vector)) < max(0.3, 1.0 / max(len(vector), 1))
@@ -131,7 +136,7 @@ class DescentSearch:
         """
         self._kind, self._archive, self._target, self._seed = kind, archive, target, seed
         self._spaces = {space.number: space for space in spaces}
-        self._left: set[object] = set()
+        self._left: set[int] = set()
         self._starts = 0
         self._class = 0
         self._inner: CmaMethod | SurrogateSearch | None = None
@@ -147,7 +152,7 @@ class DescentSearch:
     def tell(self, answers: Sequence[Answer]) -> None:
         """See :class:`Method`."""
         assert self._inner is not None  # asked before
-        values = np.array([one.robustness[self._target] for one in answers])
+        values = np.array([one.guidance[self._target] for one in answers])
         values = np.where(np.isfinite(values), values, NO_FLIGHT)
         self._inner.tell(values[:, None], np.zeros((len(values), 0)))
         self._generations += 1
@@ -156,32 +161,34 @@ class DescentSearch:
         self._lowest = min(self._lowest, lowest)
 
     def _begin(self) -> None:
-        """From the worst flight of the places not begun from yet; once there is none, from all again."""
-        elites = self._archive.elites[self._target]
-        places = [place for place in elites if place not in self._left]
-        if not places:
+        """From the flight nearest to breaking of the situations not begun from yet; at last from all again."""
+        target = self._target
+        elites = self._archive.elites[target] or {-1: self._archive.worst(target)}
+        left = [one for one in elites if one not in self._left]
+        if not left:
             self._left.clear()
-            places = list(elites)
-        place = min(places, key=lambda place: elites[place].value)
-        self._left.add(place)
-        query = elites[place].flown.query
+            left = list(elites)
+        start = elites[min(left, key=lambda one: (elites[one].answer.guidance[target], one))]
+        self._left |= {one for one, flown in elites.items() if flown is start}
+        query, lowest = start.query, float(start.answer.guidance[target])
         self._class = query.class_number
         size = self._spaces[self._class].size
         seed = self._seed + self._starts
         self._starts += 1
-        start = query.vector[None, :]
         if self._kind == "cma-es" and size > 1:
             population = 4 + int(3.0 * math.log(size))
-            self._inner = CmaMethod(start, population=population, seed=seed, penalty=False, step=FIRST_STEP)
+            self._inner = CmaMethod(
+                query.vector[None, :], population=population, seed=seed, penalty=False, step=FIRST_STEP
+            )
         else:
             known = [one for one in self._archive.flown if one.query.class_number == self._class]
             self._inner = SurrogateSearch(
                 np.array([one.query.vector for one in known]).reshape(len(known), size),
-                np.array([one.answer.robustness[self._target] for one in known]),
+                np.array([one.answer.guidance[target] for one in known]),
                 centre=query.vector,
                 seed=seed,
             )
-        self._lowest, self._since, self._generations = elites[place].value, 0, 0
+        self._lowest, self._since, self._generations = lowest, 0, 0
 
 
 def reflected(vector: FloatArray) -> FloatArray:

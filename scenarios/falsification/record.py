@@ -13,21 +13,24 @@ from pydantic import TypeAdapter
 from rtsim.errors import InputError
 from rtsim.outside import understanding
 from scenarios.campaign.kept_folder import KeptFolder
-from scenarios.falsification.evaluation import Answer, Query
+from scenarios.falsification.evaluation import Answer, Flyer, Query
 
 NUMBERS = ("nacelle_deg", "airspeed_kt", "time_s", "margin_kt", "high", "flights", "seconds")
 """Numbers of an answer, in the order in which they are kept."""
 
 
 class Record(KeptFolder):
-    """A folder of generations."""
+    """A folder of generations, which flies what it does not hold."""
 
-    def __init__(self, folder: Path, identity: dict[str, Any], *, pieces: str, fresh: bool = False) -> None:
+    def __init__(
+        self, folder: Path, identity: dict[str, Any], flyer: Flyer, *, pieces: str, fresh: bool = False
+    ) -> None:
         """Open or begin a folder.
 
         Args:
             folder: Where.
             identity: What makes this search this one.
+            flyer: Who flies.
             pieces: Name of the folder of its generations.
             fresh: Throw finished generations away.
 
@@ -37,55 +40,73 @@ class Record(KeptFolder):
         """
         super().__init__(folder, identity, noun="search", pieces=pieces, fresh=fresh)
         self._where = folder / pieces
+        self._flyer = flyer
+        self._number = 0
+        self.reused = 0
+        """Generations that were flown before."""
 
-    def answers(self, number: int, queries: Sequence[Query]) -> list[Answer] | None:
-        """What came of a generation; None where it is not finished.
+    def __call__(self, queries: Sequence[Query]) -> list[Answer]:
+        """Fly the next generation, or look up what came of it.
 
         Args:
-            number: Its number.
-            queries: What is asked.
+            queries: Its points.
 
         Raises:
             InputError: Another generation stands there: it was made by another machine.
+            OutputError: It cannot be written.
         """
-        name = f"generation{number:06d}"
-        data = self.load(name)
+        found = self._known(queries)
+        if found is None:
+            found = self._flyer(queries)
+            self._keep(queries, found)
+        else:
+            self.reused += 1
+        self._number += 1
+        return found
+
+    @property
+    def _name(self) -> str:
+        return f"generation{self._number:06d}"
+
+    def _known(self, queries: Sequence[Query]) -> list[Answer] | None:
+        """What came of a generation; None where it is not finished."""
+        data = self.load(self._name)
         if data is None:
             return None
-        mend = "add --fresh to search anew"
-        with understanding("record of a search", file=self._where / f"{name}.npz", mend=mend):
+        file, mend = str(self._where / f"{self._name}.npz"), "add --fresh to search anew"
+        with understanding("record of a search", file=file, mend=mend):
             vectors = np.concatenate([query.vector for query in queries])
             classes = [query.class_number for query in queries]
             if data["classes"].tolist() != classes or not np.array_equal(data["vectors"], vectors):
-                raise InputError("does not follow from this search's seed", file=name, mend=mend)
+                raise InputError("does not follow from this search's seed", file=file, mend=mend)
             problems = TypeAdapter(list[str]).validate_json(str(data["problems"].item()))
-            kept = zip(data["robustness"], data["numbers"].tolist(), data["cells"], problems, strict=True)
-            return [_answer(robustness, numbers, cells, problem) for robustness, numbers, cells, problem in kept]
+            named = ("robustness", "guidance", "numbers", "cells", "exercised")
+            return [_answer(*one) for one in zip(*(data[name] for name in named), problems, strict=True)]
 
-    def keep(self, number: int, queries: Sequence[Query], answers: Sequence[Answer]) -> None:
-        """Keep a generation.
-
-        Args:
-            number: Its number.
-            queries: What was asked.
-            answers: What came of it.
-
-        Raises:
-            OutputError: It cannot be written.
-        """
-        width = max(len(answer.cells) for answer in answers)
+    def _keep(self, queries: Sequence[Query], answers: Sequence[Answer]) -> None:
         self.save(
-            f"generation{number:06d}",
+            self._name,
             classes=[query.class_number for query in queries],
             vectors=np.concatenate([query.vector for query in queries]),
             robustness=[answer.robustness for answer in answers],
+            guidance=[answer.guidance for answer in answers],
             numbers=[[float(getattr(answer, name)) for name in NUMBERS] for answer in answers],
-            cells=[np.frombuffer(answer.cells.ljust(width, b"\0"), dtype=np.uint8) for answer in answers],
+            cells=_bits([answer.cells for answer in answers]),
+            exercised=_bits([answer.exercised for answer in answers]),
             problems=json.dumps([answer.problem for answer in answers]),
         )
 
 
-def _answer(robustness: Any, numbers: list[float], cells: Any, problem: str) -> Answer:
-    named: dict[str, Any] = dict(zip(NUMBERS, numbers, strict=True))
-    named |= {"high": bool(named["high"]), "flights": int(named["flights"])}
-    return Answer(robustness=robustness, cells=cells.tobytes() if named["flights"] else b"", problem=problem, **named)
+def _bits(listed: list[bytes]) -> Any:
+    """Bits of answers as an array; those of a point without a flight are 0."""
+    width = max(len(one) for one in listed)
+    return [np.frombuffer(one.ljust(width, b"\0"), dtype=np.uint8) for one in listed]
+
+
+def _answer(robustness: Any, guidance: Any, numbers: Any, cells: Any, exercised: Any, problem: str) -> Answer:
+    named: dict[str, Any] = dict(zip(NUMBERS, numbers.tolist(), strict=True))
+    named |= {"high": bool(named["high"]), "flights": int(named["flights"]), "problem": problem}
+    if not named["flights"]:
+        return Answer(robustness=robustness, guidance=guidance, cells=b"", exercised=b"", **named)
+    bits = {"cells": cells.tobytes(), "exercised": exercised.tobytes()}
+    return Answer(robustness=robustness, guidance=guidance, **bits, **named)

@@ -5,37 +5,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 from rtsim.random_streams import STREAM_SEARCH, stream_generator
 from scenarios.campaign.chunks import Task, task_spec
 from scenarios.falsification.archive import Archive, Flown
-from scenarios.falsification.evaluation import Answer, Query
-from scenarios.falsification.methods import DescentSearch, EliteSearch, Method, RandomSearch
-from scenarios.falsification.record import Record
+from scenarios.falsification.evaluation import Flyer
+from scenarios.falsification.methods import DescentSearch, Method, RandomSearch, SituationSearch
 from scenarios.falsification.space import ClassSpace, class_spaces
 
-MethodName = Literal["mixed", "elites", "cma-es", "surrogate", "random"]
+MethodName = Literal["mixed", "situations", "cma-es", "surrogate", "random"]
 METHODS: tuple[MethodName, ...] = get_args(MethodName)
 """Methods by name; ``mixed`` takes the others in turns."""
-TURNS: tuple[MethodName, ...] = ("elites", "cma-es", "elites", "surrogate")
+TURNS: tuple[MethodName, ...] = ("situations", "cma-es", "situations", "surrogate")
 """Turns of ``mixed``, after the first generations."""
 FIRST_PER_CLASS = 4
 """Flights of every class that are drawn before anything is varied."""
 MOST_WITHOUT_START = 20
 """Points tried for each flight of the budget, where most have no start."""
-
-
-class Flyer(Protocol):
-    """Flies points, here or elsewhere, and gives the answers in their order."""
-
-    def __call__(self, queries: Sequence[Query]) -> list[Answer]:
-        """Fly.
-
-        Args:
-            queries: The points.
-        """
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +45,6 @@ class SearchResult:
     """Everything flown."""
     stopped_by: BaseException | None = None
     """Ctrl-C or SIGTERM, for the caller to raise again once all is safe."""
-    reused: int = 0
-    """Generations that came from the record."""
     cpu_s: float = 0.0
     """CPU time of the flights [s]."""
     wall_s: float = 0.0
@@ -75,7 +60,7 @@ def run_search(
     budget: int,
     method: MethodName = "mixed",
     keep_on: bool = False,
-    record: Record | None = None,
+    classes: Sequence[str] = (),
     on_progress: Callable[[Progress], None] | None = None,
 ) -> SearchResult:
     """Search.
@@ -85,20 +70,19 @@ def run_search(
         flyer: Who flies.
         budget: Flights under test.
         method: How to look.
+        classes: Names of the classes that are searched; empty for all.
         keep_on: Go on for the least robustness when all properties are broken.
-        record: What was flown before, and where it is kept; None keeps nothing.
         on_progress: Told after each generation.
 
     Returns:
         What was found: the same for any flyer, and after any interruption.
 
     Raises:
-        InputError: The record does not follow from the task.
-        OutputError: The record cannot be written.
+        KeyboardInterrupt: Ctrl-C came before the first flight.
     """
     spec = task_spec(task.text, task.file)
-    spaces = class_spaces(spec)
-    archive = Archive([item.duration_s or spec.duration_s for item in spec.classes])
+    spaces = [space for space in class_spaces(spec) if not classes or space.name in classes]
+    archive = Archive()
     result = SearchResult(archive)
     plan = _Plan(task, method, archive, spaces)
     begin, number = time.perf_counter(), 0
@@ -113,13 +97,7 @@ def run_search(
                 break
             current = plan.method(number, targets)
             queries = current.ask()[: budget - len(archive.flown)] if method == "random" else current.ask()
-            answers = None if record is None else record.answers(number, queries)
-            if answers is None:
-                answers = flyer(queries)
-                if record is not None:
-                    record.keep(number, queries, answers)
-            else:
-                result.reused += 1
+            answers = flyer(queries)
             before = len(archive.flown)
             archive.add(queries, answers)
             current.tell(answers)
@@ -163,6 +141,6 @@ class _Plan:
     def _made(self, name: MethodName, target: int) -> Method:
         branch = 2 + METHODS.index(name) + len(METHODS) * target
         random = stream_generator(self._task.seed, STREAM_SEARCH, branch)
-        if name == "elites":
-            return EliteSearch(self._spaces, self._archive, target, random)
+        if name == "situations":
+            return SituationSearch(self._spaces, self._archive, target, random)
         return DescentSearch(name, self._archive, target, int(random.integers(2**40)), self._spaces)

@@ -191,7 +191,7 @@ class Tester:
         scenario = scenario.with_options(**self._options)
         if scenario.trial is None:
             return self._flight_case(scenario)
-        return self._trial_case(_judged(scenario), scenario.trial)
+        return self._trial_case(judged_scenario(scenario), scenario.trial)
 
     def _trial_case(self, scenario: Scenario, trial: Trial) -> Case:
         begin = time.perf_counter()
@@ -253,8 +253,12 @@ def plan_of(scenario: Scenario) -> FlightPlan:
     return FlightPlan(flight_setup(scenario), scenario.duration)
 
 
-def _judged(scenario: Scenario) -> Scenario:
-    """The scenario in the corridor it is judged by: its own; else trials, whatever the law, that of trials."""
+def judged_scenario(scenario: Scenario) -> Scenario:
+    """The scenario in the corridor it is judged by: its own; else trials, whatever the law, that of trials.
+
+    Args:
+        scenario: The scenario.
+    """
     corridor = TRIAL_CORRIDOR if scenario.trial is not None else None
     return scenario.with_options(corridor=scenario.options.corridor or corridor)
 
@@ -275,7 +279,7 @@ def broken_case(scenario: Scenario, law: str | None, problem: str) -> Case:
     trial = scenario.trial
     law = law or (trial.law if trial is not None else scenario.options.protection)
     return Case(
-        scenario=_judged(scenario),
+        scenario=judged_scenario(scenario),
         law=law,
         kind=trial.kind if trial is not None else "flight",
         findings=(),
