@@ -42,6 +42,7 @@ COMMAND_MODULES = (
     "timing",
     "test",
     "campaign",
+    "breaking",
     "optimize",
     "reproduce",
     "validate",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
-import io
+import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
+from rtsim.properties.reader import identifiers, read
 from rtsim.properties.robustness import Evaluator, Trace, check_window
 from rtsim.properties.words import TWIN, check_names, unit_of, values_of
 
@@ -101,8 +101,9 @@ class Property:
         trace = self._trace(flight, dt, twin)
         over_time = Evaluator().visit(self.tree, trace)
         value, later = float(over_time[0]), float(over_time[min(round(LATER_S / dt), trace.frames - 1)])
-        for node, found in trace.predicates:
-            places = np.flatnonzero(np.abs(found) == abs(value))
+        # What decides stands in the formula as it is, or behind a "not".
+        for sign, (node, found) in itertools.product((1.0, -1.0), trace.predicates):
+            places = np.flatnonzero(found == sign * value)
             if places.size:
                 return Robustness(value, _unit(node, self.formula), float(places[0]) * dt, _words(node), later)
         return Robustness(value, "", 0.0, self.formula, later)
@@ -143,28 +144,15 @@ def parse_property(formula: str) -> Property:
     Raises:
         InputError: It cannot be read, speaks of what is not there, or compares what has different units.
     """
-    import rtamt
-    from antlr4 import InputStream
-    from rtamt.antlr.parser.stl.StlLexer import StlLexer
-
     key = "property"
     if len(formula) > LARGEST_FORMULA or formula.count("(") > LARGEST_FORMULA // 20:
         raise InputError("is too long", key=key, value=formula[:40] + "...", allowed=f"{LARGEST_FORMULA} characters")
-    with _quiet():
-        lexer = StlLexer(InputStream(formula))
-        lexer.removeErrorListeners()
-        names = sorted({token.text for token in lexer.getAllTokens() if token.type == StlLexer.Identifier})
+    names = identifiers(formula)
     check_names(names, formula)
-    read = rtamt.StlDiscreteTimeOfflineSpecification()
-    for name in names:
-        read.declare_var(name, "float")
-    read.spec = formula
     try:
-        with _quiet():
-            read.parse()
-        (tree,) = read.ast.specs
-    except (rtamt.RTAMTException, KeyError, ValueError, AttributeError, TypeError, RecursionError) as error:
-        raise InputError(f"cannot be read: {_told(error)}", key=key, value=formula, mend=_EXAMPLE) from None
+        tree = read(formula, names)
+    except ValueError as error:
+        raise InputError(f"cannot be read: {_told(str(error))}", key=key, value=formula, mend=_EXAMPLE) from None
     parts = list(_parts(tree))
     for node in parts:
         check_window(node, formula)
@@ -181,17 +169,11 @@ _VALUES = {"Variable", "Constant", "Abs", "Sqrt", "Exp", "Pow", "Addition", "Sub
 _SIGNS = ("<", "<=", "==", "!=", ">", ">=")
 
 
-def _quiet() -> contextlib.AbstractContextManager[Any]:
-    """Without antlr's word, on stdout, that rtamt's parser was made by another version of it."""
-    return contextlib.redirect_stdout(io.StringIO())
-
-
-def _told(error: Exception) -> str:
+def _told(words: str) -> str:
     """What the parser says, without its list of all that could stand there."""
-    words = str(error).removeprefix("RTAMT Exception: ").strip()
     words = re.sub(r" expecting \{.*\}", "", words.replace("<EOF>", "end"))
     place = re.match(r"(\d+):(\d+): Syntax ERROR, (.*)", words)
-    return f"{place[3]} (character {int(place[2]) + 1})" if place else words or type(error).__name__
+    return f"{place[3]} (character {int(place[2]) + 1})" if place else words
 
 
 def _parts(node: Any) -> Iterator[Any]:

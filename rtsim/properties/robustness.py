@@ -7,8 +7,6 @@ Robustness is that of Donzé and Maler (2010); windows that reach beyond the las
 
 from __future__ import annotations
 
-import sys
-import typing
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -18,11 +16,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-
-sys.modules.setdefault("typing.io", typing)  # antlr 4.7 asks for it; Python 3.13 has it no more
-
-from rtamt.semantics.enumerations.comp_oper import StlComparisonOperator as Comparison  # noqa: E402
-from rtamt.syntax.ast.visitor.stl.ast_visitor import StlAstVisitor  # noqa: E402
+from rtsim.properties.reader import Comparison, StlAstVisitor
 
 NANOSECONDS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "": 10**9}
 """Units of a window's bounds; seconds where none is given."""

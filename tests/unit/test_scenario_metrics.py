@@ -505,7 +505,8 @@ campaign, _ = parse_campaign(CAMPAIGN, file="mine.toml")
 rows = np.zeros((5, SIGNAL_COUNT))
 rows[:, COLUMN.airspeed_kt] = [1.0, 3.0, 7.0, 2.0, 0.0]
 numbers = metrics.measured(rows, Programme.hold(airspeed=0.0, nacelle_angle=0.0, altitude=100.0), 0.004)
-flights = Flights(campaign, (LawVariant("full"), LawVariant("off")), (np.tile(numbers, (3, 2, 1)),), (np.zeros((3, 2, 0)),), (3,))
+laws, asked = (LawVariant("full"), LawVariant("off")), (np.zeros((3, 2, 0)),)
+flights = Flights(campaign, laws, (np.tile(numbers, (3, 2, 1)),), asked, (3,))
 print(json.dumps({
     "problems": [str(item) for item in problems],
     "flight": metrics.FlightMetrics(numbers).asdict()["toy_kt"],
