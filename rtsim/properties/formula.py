@@ -156,6 +156,7 @@ def parse_property(formula: str) -> Property:
     parts = list(_parts(tree))
     for node in parts:
         check_window(node, formula)
+        _check_brackets(node, formula)
     comparisons = [node for node in parts if type(node).__name__ == "Predicate"]
     if not comparisons or not _is_logic(tree):
         raise InputError("compares nothing", key=key, value=formula, mend=_EXAMPLE)
@@ -176,9 +177,20 @@ def _told(words: str) -> str:
     return f"{place[3]} (character {int(place[2]) + 1})" if place else words
 
 
+def _check_brackets(node: Any, formula: str) -> None:
+    """Refuse what rtamt reads otherwise than people: ``a - b + c`` as ``a - (b + c)``, ``a / b * c`` alike."""
+    for outer, inner, mend in (
+        ("Subtraction", "Addition", "write a - b - c, or (a - b) + c"),
+        ("Division", "Multiplication", "write a / b / c, or (a / b) * c"),
+    ):
+        if type(node).__name__ == outer and type(node.children[1]).__name__ == inner:
+            problem = f"would be read as {_words(node)}"
+            raise InputError(problem, key="property", value=formula, mend=mend)
+
+
 def _parts(node: Any) -> Iterator[Any]:
     yield node
-    for child in node.children:
+    for child in node.children[:2]:  # rtamt enters those of a sum twice
         yield from _parts(child)
 
 
@@ -186,8 +198,8 @@ def _is_logic(node: Any) -> bool:
     """Whether comparisons stand where truth is asked for, and nothing else does."""
     kind = type(node).__name__
     if kind == "Predicate":
-        return all(type(part).__name__ in _VALUES for child in node.children for part in _parts(child))
-    return kind not in _VALUES and bool(node.children) and all(_is_logic(child) for child in node.children)
+        return all(type(part).__name__ in _VALUES for child in node.children[:2] for part in _parts(child))
+    return kind not in _VALUES and bool(node.children) and all(_is_logic(child) for child in node.children[:2])
 
 
 def _unit(node: Any, formula: str) -> str:
@@ -202,7 +214,7 @@ def _unit_or_none(node: Any, formula: str) -> str | None:
         return None
     if kind == "Variable":
         return unit_of(node.var)
-    units = [_unit_or_none(child, formula) for child in node.children]
+    units = [_unit_or_none(child, formula) for child in node.children[:2]]
     if kind == "Abs":
         return units[0]
     if kind in {"Multiplication", "Division"}:
@@ -225,7 +237,7 @@ def _words(node: Any) -> str:
         return str(node.var)
     if kind == "Constant":
         return f"{node.val:g}"
-    inner = [_words(child) for child in node.children]
+    inner = [_words(child) for child in node.children[:2]]
     signs = {"Addition": "+", "Subtraction": "-", "Multiplication": "*", "Division": "/"}
     if kind == "Predicate":
         return f"{inner[0]} {_SIGNS[node.operator.value]} {inner[1]}"

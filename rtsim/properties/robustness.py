@@ -41,7 +41,7 @@ class Evaluator(StlAstVisitor):  # type: ignore[misc]  # rtamt has no types
 
     def visitPredicate(self, node: Any, trace: Trace) -> FloatArray:  # noqa: N802
         """A comparison: how far it is from turning over."""
-        left, right = (self.visit(child, trace) for child in node.children)
+        left, right = self._pair(node, trace)
         value = node.operator.value
         if value in {Comparison.LEQ.value, Comparison.LESS.value}:
             found = right - left
@@ -61,7 +61,7 @@ class Evaluator(StlAstVisitor):  # type: ignore[misc]  # rtamt has no types
         return np.full(trace.frames, float(node.val))
 
     def _pair(self, node: Any, trace: Trace) -> tuple[FloatArray, FloatArray]:
-        left, right = (self.visit(child, trace) for child in node.children)
+        left, right = (self.visit(child, trace) for child in node.children[:2])  # rtamt enters those of a sum twice
         return left, right
 
     def visitNot(self, node: Any, trace: Trace) -> FloatArray:  # noqa: N802
@@ -84,7 +84,8 @@ class Evaluator(StlAstVisitor):  # type: ignore[misc]  # rtamt has no types
     def visitIff(self, node: Any, trace: Trace) -> FloatArray:  # noqa: N802
         """Both or none."""
         left, right = self._pair(node, trace)
-        return -np.abs(left - right)
+        with np.errstate(invalid="ignore"):  # of two infinities
+            return -np.where(left == right, 0.0, np.abs(left - right))
 
     def visitXor(self, node: Any, trace: Trace) -> FloatArray:  # noqa: N802
         """One of them."""

@@ -39,13 +39,12 @@ def subject_of(name_or_path: str | None, *, bandwidth_hz: float = BANDWIDTH_HZ) 
     if name in shipped_names(LIBRARY) or _is_campaign(name):
         return (*load_campaign(name), name)
     scenario = load_scenario(name)
-    file = name if name.endswith(".toml") or "/" in name else scenario.name
-    where = str(Path(name).resolve()) if file == name else scenario.name
+    where = str(Path(name).resolve()) if name.endswith(".toml") or "/" in name else scenario.name
     text = around_scenario(where, scenario.name, scenario.duration, bandwidth_hz)
-    spec, problems = parse_campaign(text, file=file)
+    spec, problems = parse_campaign(text, file=name)
     if spec is None:
         raise problems[0]
-    return spec, text, file
+    return spec, text, name
 
 
 def around_scenario(where: str, name: str, duration_s: float, bandwidth_hz: float) -> str:

@@ -24,6 +24,8 @@ from rtsim.optimization.problem import Evaluation
 from rtsim.optimization.search import Record
 from scenarios.campaign.chunks import Chunk, ChunkResult
 from scenarios.campaign.store import Store
+from scenarios.falsification.evaluation import Answer, Query
+from scenarios.falsification.record import Record as FlownRecord
 from scenarios.flight import replay
 from telemetry.log.format import FlightMetadata, LogEvent
 from telemetry.log.reader import read_log
@@ -176,6 +178,29 @@ def test_records_of_searches(tmp_path):
     assert len(Record(path, "this search").generations) == 3
     refused = sum(refuses(Record, _written(path, damaged(data, dice) or b"x"), "this search") for _ in range(150))
     assert refused > 100
+
+
+def test_records_of_searches_for_broken_laws(tmp_path):
+    dice, queries = random.Random(7), [Query(0, np.array([0.4, 0.5]))] * 3
+    numbers = np.array([1.0])
+    one = Answer(numbers, numbers, 1, 0.0, 0.0, 0.0, 0.0, False, b"\1" * 62, b"\2" * 74, "", 0.1)
+    flown = []
+
+    def fly(asked):
+        flown.append(asked)
+        return [one] * len(asked)
+
+    FlownRecord(tmp_path, {"law": "full"}, fly, pieces="generations")(queries)
+    [piece] = (tmp_path / "generations").iterdir()
+    data = piece.read_bytes()
+    for _ in range(100):
+        piece.write_bytes(damaged(data, dice))
+        try:
+            found = FlownRecord(tmp_path, {"law": "full"}, fly, pieces="generations")(queries)
+        except InputError:
+            continue
+        assert len(found) == 3
+    assert len(flown) > 40
 
 
 def test_pieces_of_campaigns(tmp_path):
