@@ -213,20 +213,22 @@ def test_descents_find_the_lowest_point(kind):
 
 
 def test_situations_are_gone_round():
-    """Situations are twentieths of a coordinate squeezed to where random points rarely are: all are found."""
+    """Situations are fortieths of a mean of eight numbers, whose deviation is four: rare ones are visited, too."""
 
-    def rare(make):
+    def visits(make):
         archive, space = Archive(), class_spaces(load_campaign("misuse")[0])[0]
         spaces = [dataclasses.replace(space, coordinates=(None,) * 8)]
         method = make(spaces, archive)
         for _ in range(60):
             queries = method.ask()
             archive.add(queries, [answer(1.0, (int(40 * query.vector.mean()),)) for query in queries])
-        return int((archive.visits > 0).sum())
+        return archive.visits[8:32]  # three deviations either way
 
     generator = np.random.default_rng(4)
-    by_chance = rare(lambda spaces, _: RandomSearch(spaces, generator))
-    assert rare(lambda spaces, archive: SituationSearch(spaces, archive, 0, generator)) > by_chance + 5
+    by_chance = visits(lambda spaces, _: RandomSearch(spaces, generator))
+    gone_round = visits(lambda spaces, archive: SituationSearch(spaces, archive, 0, generator))
+    assert by_chance.min() < 3.0
+    assert gone_round.min() > 10.0
 
 
 def test_methods_are_functions_of_their_seed():
