@@ -87,8 +87,6 @@ class Property:
         """Ask a flight.
 
         Args:
-            flight: The flight.
-            dt: Length of a frame [s].
             twin: The same flight without a law; needed where the formula speaks of it.
 
         Returns:
@@ -112,8 +110,6 @@ class Property:
         """Robustness of what stands behind the outermost ``always``, over time, shape (frames,): for plots.
 
         Args:
-            flight: The flight.
-            dt: Length of a frame [s].
             twin: The same flight without a law.
         """
         inner = self.tree.children[0] if type(self.tree).__name__ == "Always" else self.tree

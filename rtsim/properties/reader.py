@@ -2,6 +2,9 @@
 
 It needs antlr 4.7, which imports ``typing.io``: deprecated since Python 3.8 and gone with 3.12. The name is there while
 antlr is loaded. What antlr prints of its versions (rtamt's parser was made by another one) is kept from stdout.
+
+Legend:
+    told: Where the parser is.
 """
 
 from __future__ import annotations
@@ -32,13 +35,13 @@ __all__ = ["Comparison", "Patient", "StlAstVisitor", "identifiers", "read", "rta
 class Patient(STLParserErrorListener):  # type: ignore[misc]  # rtamt has no types
     """Raises mistakes alone: rtamt's own raises where antlr has to look twice, too, as it has at ``2*x - 1 > 0``."""
 
-    def reportAmbiguity(self, *_: object) -> None:  # noqa: N802
+    def reportAmbiguity(self, *told: object) -> None:  # noqa: N802
         """Two readings, of which the first is taken."""
 
-    def reportAttemptingFullContext(self, *_: object) -> None:  # noqa: N802
+    def reportAttemptingFullContext(self, *told: object) -> None:  # noqa: N802
         """A second look."""
 
-    def reportContextSensitivity(self, *_: object) -> None:  # noqa: N802
+    def reportContextSensitivity(self, *told: object) -> None:  # noqa: N802
         """A second look that found one reading."""
 
 

@@ -3,6 +3,10 @@
 rtamt (Nickovic and Yamaguchi 2020) reads the formulas; its own monitors go sample by sample in Python, which takes
 longer than the flight itself. The visitor here gives the same numbers (tests compare them) a hundred times faster.
 Robustness is that of Donzé and Maler (2010); windows that reach beyond the last frame see only what was flown.
+
+Legend:
+    node: A part of the formula, as rtamt reads it.
+    trace: The flight.
 """
 
 from __future__ import annotations
@@ -255,7 +259,6 @@ def check_window(node: Any, formula: str) -> None:
     """Refuse a window that ends before it begins.
 
     Args:
-        node: A part of the formula.
         formula: The formula, for the sentence.
 
     Raises:

@@ -2,6 +2,13 @@
 
 Every draw has a place, such as ``pulses[0][2].amount``: for a generator only the order counts, for a point the place
 names its coordinate. A point gives the flights that a campaign draws, with the same probabilities.
+
+Legend:
+    place: What is drawn.
+    number: The distribution.
+    count: How many there are.
+    generator: Where numbers are drawn from.
+    point: Coordinates by place, 0 to 1.
 """
 
 from __future__ import annotations
@@ -29,37 +36,19 @@ class Chance(Protocol):
     """Starts that may be drawn before a class is said to have none."""
 
     def number(self, place: str, number: Number) -> float:
-        """Draw from a distribution; a constant is itself.
-
-        Args:
-            place: What is drawn.
-            number: The distribution.
-        """
+        """Draw from a distribution; a constant is itself."""
         ...
 
     def share(self, place: str) -> float:
-        """Draw evenly from 0 to 1.
-
-        Args:
-            place: What is drawn.
-        """
+        """Draw evenly from 0 to 1."""
         ...
 
     def index(self, place: str, count: int) -> int:
-        """Draw one of several.
-
-        Args:
-            place: What is drawn.
-            count: How many there are.
-        """
+        """Draw one of several."""
         ...
 
     def seed(self, place: str) -> int:
-        """Draw the root of random streams.
-
-        Args:
-            place: What is drawn.
-        """
+        """Draw the root of random streams."""
         ...
 
 

@@ -156,11 +156,7 @@ def fly_chunk(task: Task, chunk: Chunk) -> ChunkResult:
 
 
 def flown_of(flight: TrialFlight) -> Flown:
-    """A flight as properties see it.
-
-    Args:
-        flight: The flight.
-    """
+    """A flight as properties see it."""
     return Flown(flight.rows, flight.metrics.numbers)
 
 

@@ -5,6 +5,13 @@ a side of the corridor and varies those of the rarest (as fuzzers go after rare 
 Clune 2015): it goes round the corridor. ``cma-es`` (pycma) and ``surrogate`` go down from the flights nearest to
 breaking. Every method is a function of its seed and of what it is told, so that a search can be repeated, and resumed
 from its record.
+
+Legend:
+    spaces: The classes.
+    random: Source of randomness.
+    archive: Everything flown.
+    target: Place of the property.
+    answers: What came of the points asked for, in their order.
 """
 
 from __future__ import annotations
@@ -48,11 +55,7 @@ class Method(Protocol):
         ...
 
     def tell(self, answers: Sequence[Answer]) -> None:
-        """Learn what became of the points asked for.
-
-        Args:
-            answers: What came of them, in the order of the points.
-        """
+        """Learn what became of the points asked for."""
         ...
 
 
@@ -83,14 +86,7 @@ class SituationSearch:
     def __init__(
         self, spaces: Sequence[ClassSpace], archive: Archive, target: int, random: np.random.Generator
     ) -> None:
-        """Look at what is flown.
-
-        Args:
-            spaces: The classes.
-            archive: Everything flown.
-            target: Place of the property.
-            random: Source of randomness.
-        """
+        """Look at what is flown."""
         self._fresh = RandomSearch(spaces, random)
         self._archive, self._target, self._random = archive, target, random
         self._tried = np.zeros(SITUATIONS)
@@ -129,10 +125,7 @@ class DescentSearch:
 
         Args:
             kind: ``cma-es`` or ``surrogate``.
-            archive: Everything flown; starts are its worst flights, each place once.
-            target: Place of the property.
             seed: Root of its random streams.
-            spaces: The classes.
         """
         self._kind, self._archive, self._target, self._seed = kind, archive, target, seed
         self._spaces = {space.number: space for space in spaces}

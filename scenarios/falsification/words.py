@@ -20,7 +20,6 @@ def told(tables: Tables, law: str, formula: str, robustness: Robustness, flight:
         law: The law that was flown.
         formula: The property.
         robustness: How far it was broken.
-        flight: The flight.
     """
     start = tables["start"]
     done = [f"From {start['airspeed_kt']:.3g} kn with the nacelles at {start['nacelle_deg']:.3g} deg:"]

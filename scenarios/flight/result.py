@@ -164,7 +164,6 @@ def clause_value(clause: Expectation, metrics: FlightMetrics, rows: FloatArray, 
         clause: The clause.
         metrics: What was measured.
         rows: The frame history.
-        dt: Length of a frame [s].
     """
     if not clause.formula:
         return metrics.value(clause.metric)

@@ -169,8 +169,8 @@ def test_a_planted_hole_is_found_and_its_cause_shows(planted):
     found = broken(law="planted_law:Hole", budget=120)
     [example] = found.counterexamples
     flight = tester.Tester(law="planted_law:Hole").run(_scenario(example, planted)).flight
-    frame = int(np.argmax(flight.rows[:, _column("margin_low_kt")] < 2.0))  # closer than the full law comes
-    assert 55.0 < flight.rows[frame, _column("nacelle_deg")] < 64.0
+    nacelle, margin = (flight.rows[:, _column(name)] for name in ("nacelle_deg", "margin_low_kt"))
+    assert ((nacelle > 60.0) & (nacelle < 64.0) & (margin < 6.0)).any()
     mended = tester.Tester(law="full").run(_scenario(example, planted))
     assert all(finding.held for finding in mended.findings if finding.metric == "robustness")
     assert len(tomllib.loads(example.text).get("pulses", [])) <= 1
