@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rtsim.aircraft.condition import AircraftName
-from rtsim.atmosphere.specification import AirSpecification, Gust, Turbulence
+from rtsim.atmosphere.specification import CALM, AirSpecification, Gust, Turbulence
 from rtsim.corridor.boundaries import Corridor
 from rtsim.errors import InputError
 from rtsim.faults.fault import Fault
@@ -66,10 +67,15 @@ def plan_by(chance: Chance, spec: CampaignFile, class_number: int, options: Flig
     """
     item = spec.classes[class_number]
     common = options or FlightOptions(**given(spec))
+    own = _Own()
     if item.scenarios:
         scenario = load_scenario(item.scenarios[chance.index("scenario", len(item.scenarios))])
         programme, start = scenario.programme, scenario.start
         duration = scenario.duration if item.duration_s is None else item.duration_s
+        own = _Own(scenario.air, scenario.faults, scenario.pulses, scenario.reaction)
+        common = dataclasses.replace(
+            common, **{option.name: getattr(scenario.options, option.name) for option in CLASS_OPTIONS}
+        )
     else:
         corridor = load_boundary(spec.corridor, database_of(common.aircraft))
         start = _start(item, corridor, common.aircraft, chance)
@@ -79,7 +85,7 @@ def plan_by(chance: Chance, spec: CampaignFile, class_number: int, options: Flig
     faults = tuple(_faults(item, chance))
     gusts = tuple(_gusts(item, chance))
     severity = chance.number("turbulence_kt", item.turbulence_kt)
-    turbulence = Turbulence(wind_at_20_ft=kt(severity)) if severity > 0.0 else None
+    turbulence = Turbulence(wind_at_20_ft=kt(severity)) if severity > 0.0 else own.air.turbulence
     drawn = _options(item, chance)
     yields = chance.share("pilot.yields") < item.pilot.yields
     reaction = chance.number("pilot.reaction_s", item.pilot.reaction_s)
@@ -89,12 +95,27 @@ def plan_by(chance: Chance, spec: CampaignFile, class_number: int, options: Flig
         programme=programme,
         options=dataclasses.replace(common, **drawn),
         start=start,
-        air=AirSpecification(turbulence=turbulence, gusts=gusts, lateral=item.lateral_turbulence),
-        faults=faults,
-        pulses=tuple(pulses),
-        reaction=reaction if yields else None,
+        air=dataclasses.replace(
+            own.air,
+            turbulence=turbulence,
+            gusts=(*own.air.gusts, *gusts),
+            lateral=item.lateral_turbulence or own.air.lateral,
+        ),
+        faults=(*own.faults, *faults),
+        pulses=(*own.pulses, *pulses),
+        reaction=reaction if yields else own.reaction,
     )
     return FlightPlan(setup, duration)
+
+
+@dataclass(frozen=True, slots=True)
+class _Own:
+    """What a scenario brings itself."""
+
+    air: AirSpecification = CALM
+    faults: tuple[Fault, ...] = ()
+    pulses: tuple[Pulse, ...] = ()
+    reaction: float | None = None
 
 
 def _placed(tables: Sequence[Any], noun: str) -> list[tuple[str, Any]]:

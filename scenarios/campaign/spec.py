@@ -199,7 +199,8 @@ class ClassTable(_ClassOptions, Strict):  # type: ignore[misc]  # made from the 
     runs: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
     duration_s: Annotated[float, Field(gt=0.0, le=3600.0)] | None = None
     scenarios: list[str] = []
-    """Library scenarios to choose from; replaces start, speed and nacelle."""
+    """Library scenarios to choose from, with their own air, failures, movements and options; replaces start, speed and
+    nacelle."""
     start: StartDraw | None = None
     speed: SpeedDraw | None = None
     nacelle: NacelleDraw | None = None
