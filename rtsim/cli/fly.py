@@ -16,7 +16,7 @@ import typer
 from rtsim.choices import HAND_PILOT
 from rtsim.cli import stopping
 from rtsim.cli.compile_text import NOTICE
-from rtsim.cli.flight_text import FlightScreen, describe, say, summarize
+from rtsim.cli.flight_text import describe, say, summarize
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import emit_json
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
@@ -100,8 +100,13 @@ def fly_command(
         ),
     ] = None,
     overrun_policy: Annotated[
-        str, typer.Option(help="catch-up, or stop:N to end at the Nth overrun.", rich_help_panel="Loop")
-    ] = "catch-up",
+        str | None,
+        typer.Option(
+            help="What to do when late: catch-up, drop the backlog, or stop:N to end at the Nth overrun.",
+            show_default="catch-up; drop where hands can reach the flight by MAVLink",
+            rich_help_panel="Loop",
+        ),
+    ] = None,
     headless: Annotated[
         bool,
         typer.Option(
@@ -223,7 +228,8 @@ def fly_command(
     from scenarios.flight.preflight import preflight_problems
     from telemetry.exchange.globe import HomePosition
 
-    OverrunPolicy.parse(overrun_policy)
+    if overrun_policy is not None:
+        OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
         **options,
         turbulence=turbulence,
@@ -354,9 +360,10 @@ def _fly(
     speed: float,
     view: ViewOptions | None,
     outputs: dict[str, Any],
-    policy: str,
+    policy: str | None,
 ) -> tuple[FlightRecord, float | None, int]:
     """Fly and summarize; gives the record, when it began, and the exit code where a signal ended it (else 0)."""
+    from rtsim.cli.flight_screen import FlightScreen
     from rtsim.realtime.control import FlightControl
     from rtsim.realtime.keys import KEY_HELP, KeyReader
 
@@ -367,12 +374,13 @@ def _fly(
         if place is not None
     ]
     describe(scenario, speed=speed, outputs=places)
-    screen = FlightScreen(scenario, control, paced=not math.isinf(speed))
+    by_hand = outputs["mavlink"] is not None
+    screen = FlightScreen(scenario, control, paced=not math.isinf(speed), by_hand=by_hand)
     from scenarios.flight.runner import FlightOutputs, fly
 
-    with _stopping_signals(control) as signals, KeyReader(control) as keys:
+    with _stopping_signals(control) as signals, KeyReader(control, on_help=lambda: screen.say(KEY_HELP)) as keys:
         if keys.active and not math.isinf(speed):
-            say(f"Keys: {KEY_HELP}")
+            say("Keys: space pauses, q quits, ? lists the others.")
 
         def on_start() -> None:
             NOTICE.flies()
@@ -382,7 +390,7 @@ def _fly(
         wanted = FlightOutputs(
             **outputs,
             view=view,
-            on_message=say,
+            on_message=screen.say,
             on_rows=screen.on_rows,
             on_event=screen.on_event,
             on_start=on_start,

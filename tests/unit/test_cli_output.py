@@ -10,12 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.cli.flight_text import status_line
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.jsonable import to_jsonable
-from rtsim.realtime.control import FlightControl
 from rtsim.whole_file import whole_file
 
 
@@ -118,15 +115,3 @@ def test_a_unit_in_brackets_is_printed_and_not_taken_for_a_style(capsys):
     assert "airspeed [kn]" in told
     assert "[red] 60" in told
     assert "margin [kn]" in told
-
-
-@pytest.mark.parametrize("width", [40, 80, 200])
-def test_the_status_line_says_what_has_room_and_never_wraps(width: int) -> None:
-    row = np.zeros(SIGNAL_COUNT)
-    row[COLUMN.time_s], row[COLUMN.airspeed_kt], row[COLUMN.altitude_m] = 1234.5, -188.8, 1234.5
-    row[COLUMN.margin_kt], row[COLUMN.heading_deg], row[COLUMN.bank_deg] = -12.3, 359.6, -30.0
-    line = status_line(row, FlightControl(), width=width)
-    assert len(line) < width, "the last column would begin another line"
-    assert line.startswith("1234.5 s     1x  -188.8 kn")
-    assert ("hdg 000  bank -30" in line) == (width >= 80)
-    assert ("flapping" in line) == (width == 200)
