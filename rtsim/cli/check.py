@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
+from rtsim.cli.completion import scenario_names
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, closest, suggestion
 from rtsim.outside import read_text
@@ -33,13 +34,18 @@ def check_command(
         list[str],
         typer.Argument(
             help="Scenarios, campaigns, searches, stick maps, pilot cases, parameters, profiles (.toml), names of "
-            "those that come with rtsim, databases (.nc, .mat), flight logs."
+            "those that come with rtsim, databases (.nc, .mat), flight logs.",
+            autocompletion=scenario_names,
         ),
     ],
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Validate files of every kind without flying them; every mistake is one sentence, exit 2 for any."""
+    """Validate files of every kind without flying them; every mistake is one sentence, exit 2 for any.
+
+    Examples:
+        rtsim check my_flight.toml turn.parquet
+    """
     findings = {name: file_problems(name) for name in files}
     for name, problems in findings.items():
         for problem in problems:

@@ -16,6 +16,7 @@ import typer
 from rtsim.choices import HAND_PILOT
 from rtsim.cli import stopping
 from rtsim.cli.compile_text import NOTICE
+from rtsim.cli.completion import scenario_names
 from rtsim.cli.flight_text import describe, say, summarize
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import emit_json
@@ -45,6 +46,7 @@ def fly_command(
         typer.Argument(
             help="Name of a scenario (typical_conversion, reconversion, hover, manual_flight, ...), or a .toml file.",
             show_default="typical_conversion",
+            autocompletion=scenario_names,
         ),
     ] = None,
     *,
@@ -76,7 +78,7 @@ def fly_command(
     turbulence: Annotated[
         Severity | None,
         typer.Option(
-            help="Dryden turbulence (MIL-F-8785C).", show_default="the scenario's, none", rich_help_panel="Air"
+            help="Dryden turbulence (MIL-F-8785C).", show_default="the scenario's, else none", rich_help_panel="Air"
         ),
     ] = None,
     lateral_turbulence: Annotated[
@@ -84,7 +86,7 @@ def fly_command(
         typer.Option(
             "--lateral-turbulence/--no-lateral-turbulence",
             help="Let turbulence blow from the side, in roll and in yaw too.",
-            show_default="the scenario's, off",
+            show_default="the scenario's, else off",
             rich_help_panel="Air",
         ),
     ] = None,
@@ -221,6 +223,14 @@ def fly_command(
     While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, o
     overrides the protection, t and h switch rate damping and attitude retention, u and g automatic flaps and the
     rotor-speed governor, v and b move the flaps down and up, q quits.
+
+    Examples:
+        rtsim fly  # hover to airplane mode, 66 s, in real time
+        rtsim fly conversion_turn --speed max --log turn.parquet  # as fast as it goes, kept in a log
+        rtsim fly manual_flight --pilot mavlink --ground  # you fly; in another terminal: rtsim joystick
+        rtsim fly ep21_steep_turn --protection full  # too much bank asked for, and the law acts
+        rtsim fly --start cruise --duration 30 --turbulence moderate  # a held start in turbulence
+        rtsim fly --headless --record flight.rrd --speed max --json  # a recorded view and every number
     """
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt

@@ -56,6 +56,9 @@ def performance_command(
 
     Solved by the nonlinear model on a standard day, out of ground effect, with the published power of the engines at
     that altitude and the published torque limits of the masts. It takes some seconds.
+
+    Examples:
+        rtsim performance --weight-lb 11000 --altitude-ft 5000
     """
     from rtsim.faults.fault import EngineRating
 

@@ -25,7 +25,11 @@ def replay_command(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs."""
+    """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs.
+
+    Examples:
+        rtsim replay turn.parquet  # the same SHA-256, or where it differs
+    """
     from scenarios.flight.replay import replay_log
 
     result = replay_log(log, trust=trust)

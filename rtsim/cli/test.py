@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.completion import scenario_names
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, RtsimError
@@ -27,7 +28,11 @@ def register(app: typer.Typer) -> None:
 def run_tests(
     paths: Annotated[
         list[str] | None,
-        typer.Argument(help="Scenario names, .toml files or folders of them.", show_default="the whole library"),
+        typer.Argument(
+            help="Scenario names, .toml files or folders of them.",
+            show_default="the whole library",
+            autocompletion=scenario_names,
+        ),
     ] = None,
     *,
     protection: Annotated[
@@ -42,7 +47,13 @@ def run_tests(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails."""
+    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails.
+
+    Examples:
+        rtsim test ep21_steep_turn  # one flight, with a verdict
+        rtsim test tests/flights --junit results.xml --out failures  # a folder of them, for CI
+        rtsim test --plant nonlinear --html report.html  # the library on the nonlinear model
+    """
     for file, folder in ((junit, False), (html, False), (out, True)):
         if file is not None:
             check_writable(file, folder=folder)
