@@ -21,7 +21,7 @@ from rtsim.analysis.flight_condition import (
     solvable,
 )
 from rtsim.analysis.lateral_condition import checked_axis, joined, lateral_closed_loop, lateral_model
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 
 _AIRSPEED = typer.Option(help="Horizontal airspeed [kn].")
 _NACELLE = typer.Option(help="Nacelle angle [deg], 90 helicopter, 0 airplane.")
@@ -124,7 +124,8 @@ def trim_command(
                        acceleration_kt_s, database, density_altitude_ft, cg_in, bank_deg, sideslip_deg, lateral_kt)
     )  # fmt: skip
     request = solvable(request)
-    result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
+    with working("Solving the trim"):
+        result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
     if json:
         emit_json(result)
     if not point.converged:
@@ -175,18 +176,19 @@ def linearize_command(
     )  # fmt: skip
     checked_outer_loop(outer_loop)
     wanted = checked_axis(axis)
-    if closed_loop:
-        model = lateral_closed_loop(request) if wanted == "lateral" else closed_loop_model(request, outer_loop)
-        if wanted == "both":
-            model = joined(model, lateral_closed_loop(request))
-    else:
-        request = solvable(request)
-        model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
-        if wanted != "longitudinal":
-            lateral = lateral_model(request)
-            model = lateral if wanted == "lateral" else joined(model, lateral)
-        model["eigenvalues"] = eigenvalues(model["A"])
-    result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
+    with working("Linearizing"):
+        if closed_loop:
+            model = lateral_closed_loop(request) if wanted == "lateral" else closed_loop_model(request, outer_loop)
+            if wanted == "both":
+                model = joined(model, lateral_closed_loop(request))
+        else:
+            request = solvable(request)
+            model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
+            if wanted != "longitudinal":
+                lateral = lateral_model(request)
+                model = lateral if wanted == "lateral" else joined(model, lateral)
+            model["eigenvalues"] = eigenvalues(model["A"])
+        result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
     if json:
         emit_json(result)
     else:

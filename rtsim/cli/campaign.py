@@ -103,7 +103,7 @@ def run_campaign_command(
     )
     planned = sum(chunk.count for chunk in plan_chunks(campaign, runs))
     goes_on = "the same command goes on" if out is not None else "with --out FOLDER it could go on later"
-    with cluster_of(dask, dask_tls, jobs, goes_on) as cluster, _watched(planned, goes_on) as watch:
+    with cluster_of(dask, dask_tls, jobs, goes_on) as cluster, _watched(campaign.name, planned, goes_on) as watch:
         executor = LocalExecutor(jobs or os.cpu_count() or 1) if cluster is None else DaskExecutor(cluster)
         result = run_campaign(campaign, text, options=asked, executor=executor, file=str(spec), on_progress=watch)
     report = result.report()
@@ -120,10 +120,10 @@ def run_campaign_command(
 
 
 @contextmanager
-def _watched(planned: int, goes_on: str) -> Iterator[Callable[[int, int], None]]:
+def _watched(name: str, planned: int, goes_on: str) -> Iterator[Callable[[int, int], None]]:
     """Progress as runs end; on Ctrl-C, how to go on."""
     shown = 0
-    with progress("Flying", total=planned) as advance:
+    with progress(f"Flying the campaign {name}", total=planned) as advance:
 
         def watch(done: int, of: int) -> None:
             nonlocal shown

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from rtsim.cli.completion import scenario_names
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, closest, suggestion
 from rtsim.outside import read_text
 from rtsim.toml_file import named_text, parse_toml, shipped_names
@@ -46,7 +46,8 @@ def check_command(
     Examples:
         rtsim check my_flight.toml turn.parquet
     """
-    findings = {name: file_problems(name) for name in files}
+    with working("Checking"):
+        findings = {name: file_problems(name) for name in files}
     for name, problems in findings.items():
         for problem in problems:
             console.print(f"rtsim: error: {problem}", markup=False, soft_wrap=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.drawing import check_picture, drawing
 from rtsim.errors import InputError
 from rtsim.loop.options import CONDITION, FlightOptions
@@ -82,7 +82,8 @@ def corridor_command(
         margins = chosen.margins(kt(point[0]), deg(point[1]), deg(bank_deg))
         result |= _point_result(chosen, point, margins)
     if consistency:
-        result["consistency"] = _inconsistencies(chosen, flown.aircraft)
+        with working("Comparing with the trims"):
+            result["consistency"] = _inconsistencies(chosen, flown.aircraft)
     if plot is not None:
         _draw(chosen, point, plot, load)
         result["plot_file"] = str(plot)

@@ -19,7 +19,7 @@ from rtsim.cli.compile_text import NOTICE
 from rtsim.cli.completion import scenario_names
 from rtsim.cli.flight_text import describe, say, summarize
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import emit_json
+from rtsim.cli.output import emit_json, working
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
 
 if TYPE_CHECKING:
@@ -393,10 +393,12 @@ def _fly(
             say("Keys: space pauses, q quits, ? lists the others.")
 
         def on_start() -> None:
+            ready()
             NOTICE.flies()
             signals.arm()
             screen.first_frame_s = process_age_s()
 
+        preparing = working("Preparing the flight" if not math.isinf(speed) else "")
         wanted = FlightOutputs(
             **outputs,
             view=view,
@@ -405,7 +407,7 @@ def _fly(
             on_event=screen.on_event,
             on_start=on_start,
         )
-        with screen.running():
+        with screen.running(), preparing as ready:
             flight = fly(
                 scenario,
                 speed="max" if math.isinf(speed) else speed,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.help_text import App
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
@@ -84,8 +84,9 @@ def export_command(
     from telemetry.log.reader import read_log
 
     check_writable(target)
-    flight = read_log(log)
-    export_log(flight, target)
+    with working(f"Writing {target.name}"):
+        flight = read_log(log)
+        export_log(flight, target)
     if json:
         emit_json({"log": log, "file": target, "frames": len(flight.rows), "signals": list(flight.names)})
     else:

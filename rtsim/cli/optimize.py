@@ -11,7 +11,7 @@ import typer
 
 from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.errors import InputError
 from rtsim.loop.options import CONDITION, declared
 from rtsim.whole_file import check_writable, write_whole
@@ -215,8 +215,8 @@ def _save(
             for point in result.front
         ]
     if check and problem.has_nonlinear_model:
-        console.print("Flying the winner on the nonlinear model; the first such flight compiles it (up to 60 s).")
-        checked = nonlinear_check(problem, path)
+        with working("Flying the winner on the nonlinear model"):
+            checked = nonlinear_check(problem, path)
         summary["nonlinear_check"] = figures_summary(checked)
     return summary
 

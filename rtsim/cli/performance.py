@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from rtsim.cli.output import emit_json, results
+from rtsim.cli.output import emit_json, results, working
 from rtsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ def performance_command(
     if rating is not None and rating not in get_args(EngineRating):
         allowed = ", ".join(get_args(EngineRating))
         raise InputError("is not a rating", key="--rating", value=rating, allowed=allowed, mend="choose one")
-    result = _figures(weight_lb, altitude_ft, cg_in, rotor_rpm, rating)  # type: ignore[arg-type]  # one of these, just checked
+    with working("Solving hover, climb and level flight"):
+        result = _figures(weight_lb, altitude_ft, cg_in, rotor_rpm, rating)  # type: ignore[arg-type]  # one of these, just checked
     if json:
         emit_json(result)
     else:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rtsim.cli.flight_text import say
-from rtsim.cli.output import emit_json, results
+from rtsim.cli.output import emit_json, results, working
 from rtsim.errors import EXIT_EXPECTATION_FAILED
 
 
@@ -32,7 +32,8 @@ def replay_command(
     """
     from scenarios.flight.replay import replay_log
 
-    result = replay_log(log, trust=trust)
+    with working(f"Flying {log.name} again"):
+        result = replay_log(log, trust=trust)
     for change in result.changed_versions:
         say(f"Not the same as when it was recorded: {change}.")
     if not result.complete:

@@ -125,6 +125,7 @@ def _flown(scenarios: list[Scenario], protection: str | None, options: dict[str,
     cases = []
     with progress("Testing", total=len(scenarios)) as advance:
         for scenario in scenarios:
+            advance(0, f"Testing {scenario.name}")
             try:
                 cases.append(tester.run(scenario))
             except RtsimError as error:
