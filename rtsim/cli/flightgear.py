@@ -39,7 +39,7 @@ def flightgear_command(
     """Write an XV-15 for FlightGear and a script that starts FlightGear with it, as the window of a flight.
 
     Examples:
-        rtsim flightgear --out fg  # then start fg/start.sh, and fly with --flightgear
+        rtsim flightgear --out fg  # then sh fg/start-flightgear.sh, and rtsim fly --flightgear
     """
     from telemetry.exchange.endpoint import Endpoint
     from telemetry.exchange.globe import HomePosition

@@ -220,7 +220,7 @@ def fly_command(
 ) -> None:
     """Fly a scenario: the XV-15, the MOCM pilot, the conversion corridor, in real time unless --speed says otherwise.
 
-    While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, o
+    While it flies: space pauses, . flies one frame, + and - change the speed, 0 resets, p switches the pilot, o
     overrides the protection, t and h switch rate damping and attitude retention, u and g automatic flaps and the
     rotor-speed governor, v and b move the flaps down and up, q quits.
 

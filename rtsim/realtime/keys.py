@@ -16,7 +16,7 @@ from rtsim.realtime.control import FlightControl
 from rtsim.terminal import in_foreground, take_keys
 
 KEY_HELP = (
-    "Keys: space pause, . one frame, + - speed, r reset, p pilot, o override protection, t rate damping, "
+    "Keys: space pause, . one frame, + - speed, 0 reset, p pilot, o override protection, t rate damping, "
     "h attitude retention, u automatic flaps, v b flaps down up, g rotor-speed governor, q quit"
 )
 """What the keys do, for the user."""
@@ -46,7 +46,7 @@ def press(control: FlightControl, key: str) -> None:
         control.faster()
     elif key in {"-", "_"}:
         control.slower()
-    elif key == "r":
+    elif key == "0":
         control.reset()
     elif key == "p":
         control.set_pilot("next")
