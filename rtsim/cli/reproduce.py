@@ -33,7 +33,8 @@ def reproduce_command(
 ) -> None:
     """Regenerate the paper's figures from flights, judge its claims and write a report.
 
-    A claim that does not hold is a result, not a fault: the exit code is 0 whenever the report is written.
+    The paper is "Simulation of tiltrotor maneuvers using linear parameter varying models"; the README says what we know
+    of it. A claim that does not hold is a result, not a fault: the exit code is 0 whenever the report is written.
 
     Examples:
         rtsim reproduce --out report
