@@ -152,11 +152,11 @@ def panel(row: FloatArray, control: FlightControl, *, pace: float | None, durati
         Line((f"{row[COLUMN.time_s]:6.1f} of {duration_s:.0f} s", how_fast(control, pace), who)),
         Line(
             (
-                f"{row[COLUMN.airspeed_kt]:6.1f} kn",
+                f"{round(row[COLUMN.airspeed_kt], 1) + 0.0:6.1f} kn",
                 f"nacelle {row[COLUMN.nacelle_deg]:4.1f} deg",
-                f"bank {row[COLUMN.bank_deg]:+3.0f} deg",
+                f"bank {round(row[COLUMN.bank_deg]) + 0:+3.0f} deg",
                 f"{row[COLUMN.altitude_m]:4.0f} m",
-                f"{row[COLUMN.climb_rate_m_s]:+5.1f} m/s",
+                f"{round(row[COLUMN.climb_rate_m_s], 1) + 0.0:+5.1f} m/s",
                 f"heading {heading:03.0f}",
             )
         ),
