@@ -155,13 +155,13 @@ def _progress_bar(generations: int) -> Iterator[Callable[[Progress], None]]:
 
     columns = (
         TextColumn("Searching"),
-        BarColumn(),
+        BarColumn(bar_width=16),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.fields[best]}"),
     )
-    with Bar(*columns, console=console.real()) as bar:
+    with Bar(*columns, console=console.real(), redirect_stderr=False) as bar:
         task = bar.add_task("search", total=generations, best="")
 
         def told(progress: Progress) -> None:
