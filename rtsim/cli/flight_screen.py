@@ -113,7 +113,7 @@ class FlightScreen:
             if self._news:
                 self._clear_panel()
                 self._tell_news()
-            if self._row is not None and sys.stderr.isatty() and in_foreground(sys.stderr.fileno(), foreign=True):
+            if self._row is not None and _takes_panel():
                 self._draw_panel(self._row)
 
     def _draw_panel(self, row: FloatArray) -> None:
@@ -158,6 +158,12 @@ class FlightScreen:
                 say(_hanging(f"{news.time_s:8.2f} s  {news.text}"), style=STYLES.get(news.level))
             elif self._events == MAX_EVENT_LINES + 1:
                 say("            (further events are in the log)")
+
+
+def _takes_panel() -> bool:
+    """Whether stderr is a terminal that is ours now and can move its cursor."""
+    terminal = sys.stderr.isatty() and not console.is_dumb_terminal
+    return terminal and in_foreground(sys.stderr.fileno(), foreign=True)
 
 
 def _hanging(sentence: str) -> str:

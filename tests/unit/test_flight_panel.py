@@ -139,6 +139,16 @@ def test_events_stand_above_the_panel_which_stays_where_it_is(scenario: Any, mon
     ]
 
 
+def test_a_terminal_that_cannot_move_its_cursor_gets_no_panel(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(flight_screen, "in_foreground", lambda *_, **__: True)
+    monkeypatch.setenv("TERM", "xterm")
+    assert flight_screen._takes_panel()
+    monkeypatch.setenv("TERM", "dumb")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    assert not flight_screen._takes_panel()
+
+
 def test_a_pipe_gets_lines_without_controls(
     scenario: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
