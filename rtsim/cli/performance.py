@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 # Nacelle angle [deg], airspeeds in which the fastest climb is looked for, and one to speed up from [kn].
 _SEARCHED = ((90.0, range(20, 101, 10), 40.0), (75.0, range(30, 131, 10), 80.0), (0.0, range(90, 201, 10), 170.0))
 _WORDS = {
-    "power": "the engines give no more",
-    "torque": "the masts bear no more torque",
+    "power": "the engines end it",
+    "torque": "the masts end it",
     "trim": "no trim beyond",
-    "range": "the end of what is searched",
+    "range": "the search ends",
 }
 
 
@@ -147,7 +147,7 @@ def _number(value: float) -> float | None:
 def _print(result: dict[str, Any]) -> None:
     def say(what: str, found: dict[str, Any], figure: str) -> None:
         why = "" if figure == "none" else _WORDS[found["limit"]]
-        line = f"{what:24} {found['rotor_rpm']:3.0f} rpm  {found['rating']:11} {figure:24} {why}"
+        line = f"{what:21} {found['rotor_rpm']:3.0f} rpm {found['rating']:8} {figure:21} {why}"
         results.print(line.rstrip(), highlight=False, markup=False, soft_wrap=True)
 
     at = f"{result['altitude_ft']:g} ft"

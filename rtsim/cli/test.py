@@ -184,8 +184,7 @@ def _print(cases: list[Case]) -> None:
     laws = {case.law for case in cases}
     if len(laws) == 1:
         results.print(f"law under test: {cases[0].law}", markup=False, soft_wrap=True)
-    caption = "kn outside the corridor at the deepest, with the law and without"
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), caption=caption, caption_justify="left")
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
     table.add_column("kind", no_wrap=True)
     if len(laws) > 1:
@@ -204,6 +203,7 @@ def _print(cases: list[Case]) -> None:
             *(f"{values['depth_kt']:.1f}" if values else "" for values in (case.metrics, case.off_metrics)),
         )
     results.print(table)
+    results.print("kn out: outside the corridor at the deepest, with the law; off: without it", soft_wrap=True)
     for case in cases:
         words = [case.error] if case.error else [f"{item.name}: {item.sentence}" for item in case.failures]
         words += [case.note] if case.note else []
