@@ -332,8 +332,17 @@ def lpv_aircraft(request: AskedCondition) -> LpvAircraft:
     return load_aircraft(request.database)
 
 
-STOPPED = {"stick": "the stick", "lateral_stick": "the lateral stick", "pedal": "a pedal"}
+STOPPED = {"stick": "the stick", "elevator": "the stick", "lateral_stick": "the lateral stick", "pedal": "a pedal"}
 """Controls that end a branch of trims, in words."""
+_BALANCES = {
+    "u": "the forces along the body do not balance",
+    "v": "the side forces do not balance",
+    "w": "the forces upright to the body do not balance",
+    "p": "the rolling moments do not balance",
+    "q": "the pitching moments do not balance",
+    "r": "the yawing moments do not balance",
+}
+"""What is left over where no trim is found, by the rate that does not vanish."""
 
 
 def _reached(request: AskedCondition, point: TrimPoint) -> str:
@@ -375,7 +384,7 @@ def no_trim(request: AskedCondition, point: TrimPoint) -> TrimError:
     elif point.unclosed in VALIDITY.values():
         where += f": {point.unclosed}"
     closes = point.unclosed in {"", *STOPPED, *VALIDITY.values()}
-    left = "" if closes else f"; '{point.unclosed}' does not close"
+    left = "" if closes else f"; {_BALANCES.get(point.unclosed, f'{point.unclosed} does not come to rest')}"
     mend = "see where the aircraft flies with 'rtsim corridor'"
     if not request.solves_nonlinear:
         mend += ", or solve exactly there with --nonlinear"

@@ -21,24 +21,60 @@ from rtsim.analysis.flight_condition import (
     solvable,
 )
 from rtsim.analysis.lateral_condition import checked_axis, joined, lateral_closed_loop, lateral_model
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 
 _AIRSPEED = typer.Option(help="Horizontal airspeed [kn].")
 _NACELLE = typer.Option(help="Nacelle angle [deg], 90 helicopter, 0 airplane.")
 _NONLINEAR = typer.Option("--nonlinear", help="Solve the nonlinear model instead of reading the database.")
-_FLAP = typer.Option(help="Flap deflection [deg]; solves the nonlinear model.")
-_RPM = typer.Option(help="Rotor speed [rpm]; solves the nonlinear model.")
-_WEIGHT = typer.Option(help="Weight [lb]; solves the nonlinear model.")
-_ALTITUDE = typer.Option(help="Pressure altitude [m], standard atmosphere; solves the nonlinear model.")
-_DENSITY = typer.Option(help="Density altitude [ft], the same as --altitude-m; solves the nonlinear model.")
-_CENTRE = typer.Option(help="Centre of gravity forward of its aft limit [in]; solves the nonlinear model.")
-_ACCELERATION = typer.Option(help="Acceleration in level flight [kn/s]; solves the nonlinear model.")
-_DATABASE = typer.Option(help="Another LPV database than the shipped one (.nc or .mat).")
+_FLAP = typer.Option(
+    help="Flap deflection [deg]; solves the nonlinear model.", show_default="scheduled", rich_help_panel="Condition"
+)
+_RPM = typer.Option(
+    help="Rotor speed [rpm]; solves the nonlinear model.", show_default="scheduled", rich_help_panel="Condition"
+)
+_WEIGHT = typer.Option(
+    help="Weight [lb]; solves the nonlinear model.", show_default="13000", rich_help_panel="Condition"
+)
+_ALTITUDE = typer.Option(
+    help="Pressure altitude [m], standard atmosphere; solves the nonlinear model.",
+    show_default="0",
+    rich_help_panel="Condition",
+)
+_DENSITY = typer.Option(
+    help="Density altitude [ft], the same as --altitude-m; solves the nonlinear model.",
+    show_default="0",
+    rich_help_panel="Condition",
+)
+_CENTRE = typer.Option(
+    help="Centre of gravity forward of its aft limit [in]; solves the nonlinear model.",
+    show_default="0",
+    rich_help_panel="Condition",
+)
+_ACCELERATION = typer.Option(
+    help="Acceleration in level flight [kn/s]; solves the nonlinear model.",
+    show_default="0",
+    rich_help_panel="Condition",
+)
+_DATABASE = typer.Option(
+    help="Another LPV database than the shipped one (.nc or .mat).", show_default="the shipped XV-15"
+)
 _CLOSED_LOOP = typer.Option("--closed-loop", help="Aircraft, pilot and outer loops together, sampled as flown.")
 _OUTER_LOOP = typer.Option(help="How the pilot holds airspeed and altitude: integrators or pi (with --closed-loop).")
-_BANK = typer.Option(help="Bank angle of a coordinated level turn, right positive [deg].")
-_SLIP = typer.Option(help="Sideslip in straight flight, wind from the right positive [deg].")
-_SIDE = typer.Option(help="Airspeed to the right, besides the one ahead [kn].")
+_BANK = typer.Option(
+    help="Bank angle of a coordinated level turn, right positive [deg].",
+    show_default="0",
+    rich_help_panel="Turn and sideward flight",
+)
+_SLIP = typer.Option(
+    help="Sideslip in straight flight, wind from the right positive [deg].",
+    show_default="0",
+    rich_help_panel="Turn and sideward flight",
+)
+_SIDE = typer.Option(
+    help="Airspeed to the right, besides the one ahead [kn].",
+    show_default="0",
+    rich_help_panel="Turn and sideward flight",
+)
 _AXIS = typer.Option(help="Motion in the plane of symmetry, out of it, or both: longitudinal, lateral or both.")
 _JSON = typer.Option("--json", help="Print one JSON object on stdout.")
 
@@ -76,14 +112,20 @@ def trim_command(
     Turns, sideslip and sideward flight (one of --bank-deg, --sideslip-deg, --lateral-kt) are solved by the nonlinear
     model, or, with --database FILE, by the LPV aircraft of that file as far as it is valid; a wind from any direction
     is an airspeed ahead (negative: from behind) and one to the right. Where there is no such flight it says how far
-    there is one and what ends it. Example: rtsim trim --airspeed-kt 80 --nacelle-deg 75 --bank-deg 30.
+    there is one and what ends it.
+
+    Examples:
+        rtsim trim --airspeed-kt 100 --nacelle-deg 75  # from the database
+        rtsim trim --airspeed-kt 80 --nacelle-deg 75 --bank-deg 30  # a coordinated turn
+        rtsim trim --airspeed-kt 0 --nacelle-deg 90 --lateral-kt 20  # hover in a wind from the right
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
                        acceleration_kt_s, database, density_altitude_ft, cg_in, bank_deg, sideslip_deg, lateral_kt)
     )  # fmt: skip
     request = solvable(request)
-    result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
+    with working("Solving the trim"):
+        result, point = nonlinear_trim(request) if request.solves_nonlinear else database_trim(request)
     if json:
         emit_json(result)
     if not point.converged:
@@ -122,6 +164,11 @@ def linearize_command(
     About straight flight the motion in the plane of symmetry and the one out of it do not meet: --axis says which is
     shown. The lateral states are v, p, r, bank, heading, the half differences right less left of the two rotors' states
     and of their pitch, aileron and rudder.
+
+    Examples:
+        rtsim linearize --airspeed-kt 100 --nacelle-deg 75  # eigenvalues; with --json the matrices
+        rtsim linearize --airspeed-kt 100 --nacelle-deg 75 --axis lateral
+        rtsim linearize --airspeed-kt 100 --nacelle-deg 75 --closed-loop  # with the pilot
     """
     request = checked(
         AskedCondition(airspeed_kt, nacelle_deg, nonlinear, flap_deg, rotor_rpm, weight_lb, altitude_m,
@@ -129,18 +176,19 @@ def linearize_command(
     )  # fmt: skip
     checked_outer_loop(outer_loop)
     wanted = checked_axis(axis)
-    if closed_loop:
-        model = lateral_closed_loop(request) if wanted == "lateral" else closed_loop_model(request, outer_loop)
-        if wanted == "both":
-            model = joined(model, lateral_closed_loop(request))
-    else:
-        request = solvable(request)
-        model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
-        if wanted != "longitudinal":
-            lateral = lateral_model(request)
-            model = lateral if wanted == "lateral" else joined(model, lateral)
-        model["eigenvalues"] = eigenvalues(model["A"])
-    result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
+    with working("Linearizing"):
+        if closed_loop:
+            model = lateral_closed_loop(request) if wanted == "lateral" else closed_loop_model(request, outer_loop)
+            if wanted == "both":
+                model = joined(model, lateral_closed_loop(request))
+        else:
+            request = solvable(request)
+            model = nonlinear_model(request) if request.solves_nonlinear else database_model(request)
+            if wanted != "longitudinal":
+                lateral = lateral_model(request)
+                model = lateral if wanted == "lateral" else joined(model, lateral)
+            model["eigenvalues"] = eigenvalues(model["A"])
+        result = {"airspeed_kt": airspeed_kt, "nacelle_deg": nacelle_deg, **model}
     if json:
         emit_json(result)
     else:
@@ -211,7 +259,9 @@ def _print_model(result: dict[str, Any]) -> None:
     results.print(table)
     if "stable" in result:
         verdict = "stable" if result["stable"] else "unstable"
-        results.print(f"The loop as flown is {verdict}: slowest growth {result['growth_rad_s']:+.4f} rad/s")
+        growth = result["growth_rad_s"]
+        pace = f"the slowest motion decays by {-growth:.4f}" if growth < 0.0 else f"a motion grows by {growth:.4f}"
+        results.print(f"The loop as flown is {verdict}: {pace} 1/s")
     for hand, margin in result.get("margins", {}).items():
         phase = f"{margin['phase_deg']:.0f} deg at {margin['crossover_rad_s']:.2f} rad/s"
         results.print(f"Margins of {hand.replace('_', ' ')}: {phase}, {margin['gain_db']:.1f} dB")

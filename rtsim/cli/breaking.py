@@ -88,8 +88,11 @@ def break_command(
 ) -> None:
     """Search the flight that breaks a law; exit 1 where one is found. It is written as a scenario.
 
-    Examples: rtsim break --protection governor | rtsim break turns --protection mylaw:Law --out found |
-    rtsim break --protection full --estimate
+    Examples:
+        rtsim break --protection governor  # the campaign misuse; the scenario and its picture are written here
+        rtsim break turns --budget 3000 --out found  # the same command goes on after a stop
+        rtsim break hover --property "always (altitude_m > 80)"  # hands and air around a scenario
+        rtsim break turns --estimate  # how likely it breaks
     """
     if out is not None:
         check_writable(out, folder=True)

@@ -25,7 +25,7 @@ def build_notice() -> Iterator[None]:
                 console.print(f"{words}.", soft_wrap=True)
                 return
             if not bar:
-                bar.append(_bar(stack))
+                bar.append(stack.enter_context(progress("Trims, linear models and pilots", total=1.0)))
             bar[0](share)
             done += share
             if done > 1.0 - 1e-6:  # what comes next has the terminal for itself
@@ -35,12 +35,3 @@ def build_notice() -> Iterator[None]:
 
         with told(note):
             yield
-
-
-def _bar(stack: ExitStack) -> Callable[[float], None]:
-    from rich.errors import LiveError
-
-    try:
-        return stack.enter_context(progress("Trims, linear models and pilots", total=1.0))
-    except LiveError:  # the command shows a bar of its own
-        return lambda _: None

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
+from rtsim.cli.completion import campaign_names
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OutputError
@@ -31,7 +32,13 @@ def register(app: typer.Typer) -> None:
 
 @takes_options("plant", "database", *CONDITION, "rate_hz", own="the file's")
 def run_campaign_command(
-    spec: Annotated[str, typer.Argument(help="Campaign that comes with rtsim (misuse, nominal) or a .toml file.")],
+    spec: Annotated[
+        str,
+        typer.Argument(
+            help="Campaign that comes with rtsim (misuse, nominal) or a .toml file.",
+            autocompletion=campaign_names,
+        ),
+    ],
     *,
     runs: Annotated[int | None, typer.Option(help="Runs of every class.", min=1, show_default="the file's")] = None,
     jobs: Annotated[int | None, typer.Option(help="Processes.", min=1, max=256, show_default="one per core")] = None,
@@ -64,7 +71,12 @@ def run_campaign_command(
     junit: Annotated[Path | None, typer.Option(help="Write JUnit XML here.", show_default="none")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly a campaign: drawn flights, each with every law and without; exit 1 where an expectation does not hold."""
+    """Fly a campaign: drawn flights, each with every law and without; exit 1 where an expectation does not hold.
+
+    Examples:
+        rtsim campaign nominal --runs 200  # drawn flights that the law must leave alone
+        rtsim campaign misuse --out misuse --against governor  # the same command goes on after a stop
+    """
     for file, folder in ((out, True), (junit, False)):
         if file is not None:
             check_writable(file, folder=folder)
@@ -91,7 +103,7 @@ def run_campaign_command(
     )
     planned = sum(chunk.count for chunk in plan_chunks(campaign, runs))
     goes_on = "the same command goes on" if out is not None else "with --out FOLDER it could go on later"
-    with cluster_of(dask, dask_tls, jobs, goes_on) as cluster, _watched(planned, goes_on) as watch:
+    with cluster_of(dask, dask_tls, jobs, goes_on) as cluster, _watched(campaign.name, planned, goes_on) as watch:
         executor = LocalExecutor(jobs or os.cpu_count() or 1) if cluster is None else DaskExecutor(cluster)
         result = run_campaign(campaign, text, options=asked, executor=executor, file=str(spec), on_progress=watch)
     report = result.report()
@@ -108,10 +120,10 @@ def run_campaign_command(
 
 
 @contextmanager
-def _watched(planned: int, goes_on: str) -> Iterator[Callable[[int, int], None]]:
+def _watched(name: str, planned: int, goes_on: str) -> Iterator[Callable[[int, int], None]]:
     """Progress as runs end; on Ctrl-C, how to go on."""
     shown = 0
-    with progress("Flying", total=planned) as advance:
+    with progress(f"Flying the campaign {name}", total=planned) as advance:
 
         def watch(done: int, of: int) -> None:
             nonlocal shown

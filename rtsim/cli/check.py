@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.completion import scenario_names
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.errors import EXIT_BAD_INPUT, InputError, RtsimError, closest, suggestion
 from rtsim.outside import read_text
 from rtsim.toml_file import named_text, parse_toml, shipped_names
@@ -33,14 +34,20 @@ def check_command(
         list[str],
         typer.Argument(
             help="Scenarios, campaigns, searches, stick maps, pilot cases, parameters, profiles (.toml), names of "
-            "those that come with rtsim, databases (.nc, .mat), flight logs."
+            "those that come with rtsim, databases (.nc, .mat), flight logs.",
+            autocompletion=scenario_names,
         ),
     ],
     *,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Validate files of every kind without flying them; every mistake is one sentence, exit 2 for any."""
-    findings = {name: file_problems(name) for name in files}
+    """Validate files of every kind without flying them; every mistake is one sentence, exit 2 for any.
+
+    Examples:
+        rtsim check my_flight.toml turn.parquet
+    """
+    with working("Checking"):
+        findings = {name: file_problems(name) for name in files}
     for name, problems in findings.items():
         for problem in problems:
             console.print(f"rtsim: error: {problem}", markup=False, soft_wrap=True)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
-from rtsim.cli.output import console
+from rtsim.cli.output import console, tell_bar
 from rtsim.cli.stopping import raise_if_lost
 
 if TYPE_CHECKING:
@@ -40,7 +40,9 @@ class CompileNotice:
             self._told = True
             console.print("Compiling this flight's kernels: once on this installation, then they are kept.")
         if sys.stderr.isatty() and not self._flying:
-            self._draw(now)
+            of = f"/{now.total}" if now.total else ""
+            if self._bar is not None or not tell_bar(f"compiling {now.done + 1}{of}"):
+                self._draw(now)
 
     def finish(self) -> None:
         """Take the bar away and say how long it took."""
@@ -56,7 +58,6 @@ class CompileNotice:
         self._flying = True
 
     def _draw(self, now: Compiling) -> None:
-        from rich.errors import LiveError
         from rich.progress import (
             BarColumn,
             MofNCompleteColumn,
@@ -69,16 +70,14 @@ class CompileNotice:
         if not isinstance(self._bar, Progress):
             columns = (
                 TextColumn("Compiling"),
-                BarColumn(),
+                BarColumn(bar_width=16),
                 MofNCompleteColumn(),
                 TimeElapsedColumn(),
                 TimeRemainingColumn(),
                 TextColumn("{task.fields[kernel]}"),
             )
-            try:
-                self._bar = self._stack.enter_context(Progress(*columns, console=console.real(), transient=True))
-            except LiveError:  # the command shows a bar of its own
-                return
+            bar = Progress(*columns, console=console.real(), transient=True, redirect_stderr=False)
+            self._bar = self._stack.enter_context(bar)
             self._bar.add_task("compiling", total=now.total or None, kernel=now.what)
         task = self._bar.task_ids[0]
         self._bar.update(task, completed=now.done, total=now.total or None, kernel=now.what)

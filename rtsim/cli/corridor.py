@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.drawing import check_picture, drawing
 from rtsim.errors import InputError
 from rtsim.loop.options import CONDITION, FlightOptions
@@ -35,8 +35,12 @@ def corridor_command(
     corridor: Annotated[
         str, typer.Option(help="Which corridor: design, flight, or model (what the aircraft's trims allow).")
     ] = "design",
-    airspeed_kt: Annotated[float | None, typer.Option(help="Airspeed of a point [kn].")] = None,
-    nacelle_deg: Annotated[float | None, typer.Option(help="Nacelle angle of the point [deg], 90 helicopter.")] = None,
+    airspeed_kt: Annotated[
+        float | None, typer.Option(help="Airspeed of a point [kn].", show_default="no point")
+    ] = None,
+    nacelle_deg: Annotated[
+        float | None, typer.Option(help="Nacelle angle of the point [deg], 90 helicopter.", show_default="no point")
+    ] = None,
     bank_deg: Annotated[
         float, typer.Option(help="Bank of a level turn [deg]: its load factor moves the sides.", min=-60.0, max=60.0)
     ] = 0.0,
@@ -45,9 +49,16 @@ def corridor_command(
     ] = False,
     options: dict[str, Any],
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
-    plot: Annotated[Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the corridor into FILE (.png, .svg or .pdf).", show_default="none")
+    ] = None,
 ) -> None:
-    """Show the boundaries and centre line of the conversion corridor; with a point, its margins."""
+    """Show the boundaries and centre line of the conversion corridor; with a point, its margins.
+
+    Examples:
+        rtsim corridor --airspeed-kt 60 --nacelle-deg 75  # margins of a point
+        rtsim corridor --corridor flight --bank-deg 30 --plot corridor.png  # in a turn, as a picture
+    """
     if plot is not None:
         check_picture(plot, "--plot")
         check_writable(plot)
@@ -71,7 +82,8 @@ def corridor_command(
         margins = chosen.margins(kt(point[0]), deg(point[1]), deg(bank_deg))
         result |= _point_result(chosen, point, margins)
     if consistency:
-        result["consistency"] = _inconsistencies(chosen, flown.aircraft)
+        with working("Comparing with the trims"):
+            result["consistency"] = _inconsistencies(chosen, flown.aircraft)
     if plot is not None:
         _draw(chosen, point, plot, load)
         result["plot_file"] = str(plot)

@@ -36,7 +36,11 @@ def flightgear_command(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Write an XV-15 for FlightGear and a script that starts FlightGear with it, as the window of a flight."""
+    """Write an XV-15 for FlightGear and a script that starts FlightGear with it, as the window of a flight.
+
+    Examples:
+        rtsim flightgear --out fg  # then sh fg/start-flightgear.sh, and rtsim fly --flightgear
+    """
     from telemetry.exchange.endpoint import Endpoint
     from telemetry.exchange.globe import HomePosition
     from telemetry.flightgear.config import KEFLAVIK

@@ -16,9 +16,10 @@ import typer
 from rtsim.choices import HAND_PILOT
 from rtsim.cli import stopping
 from rtsim.cli.compile_text import NOTICE
-from rtsim.cli.flight_text import FlightScreen, describe, say, summarize
+from rtsim.cli.completion import scenario_names
+from rtsim.cli.flight_text import describe, say, summarize
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import emit_json
+from rtsim.cli.output import emit_json, working
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, OverrunStop
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def fly_command(
         typer.Argument(
             help="Name of a scenario (typical_conversion, reconversion, hover, manual_flight, ...), or a .toml file.",
             show_default="typical_conversion",
+            autocompletion=scenario_names,
         ),
     ] = None,
     *,
@@ -76,7 +78,7 @@ def fly_command(
     turbulence: Annotated[
         Severity | None,
         typer.Option(
-            help="Dryden turbulence (MIL-F-8785C).", show_default="the scenario's, none", rich_help_panel="Air"
+            help="Dryden turbulence (MIL-F-8785C).", show_default="the scenario's, else none", rich_help_panel="Air"
         ),
     ] = None,
     lateral_turbulence: Annotated[
@@ -84,7 +86,7 @@ def fly_command(
         typer.Option(
             "--lateral-turbulence/--no-lateral-turbulence",
             help="Let turbulence blow from the side, in roll and in yaw too.",
-            show_default="the scenario's, off",
+            show_default="the scenario's, else off",
             rich_help_panel="Air",
         ),
     ] = None,
@@ -100,8 +102,13 @@ def fly_command(
         ),
     ] = None,
     overrun_policy: Annotated[
-        str, typer.Option(help="catch-up, or stop:N to end at the Nth overrun.", rich_help_panel="Loop")
-    ] = "catch-up",
+        str | None,
+        typer.Option(
+            help="What to do when late: catch-up, drop the backlog, or stop:N to end at the Nth overrun.",
+            show_default="catch-up; drop where hands can reach the flight by MAVLink",
+            rich_help_panel="Loop",
+        ),
+    ] = None,
     headless: Annotated[
         bool,
         typer.Option(
@@ -213,9 +220,17 @@ def fly_command(
 ) -> None:
     """Fly a scenario: the XV-15, the MOCM pilot, the conversion corridor, in real time unless --speed says otherwise.
 
-    While it flies: space pauses, . flies one frame, + and - change the warp, r resets, p switches the pilot, o
+    While it flies: space pauses, . flies one frame, + and - change the speed, 0 resets, p switches the pilot, o
     overrides the protection, t and h switch rate damping and attitude retention, u and g automatic flaps and the
     rotor-speed governor, v and b move the flaps down and up, q quits.
+
+    Examples:
+        rtsim fly  # hover to airplane mode, 66 s, in real time
+        rtsim fly conversion_turn --speed max --log turn.parquet  # as fast as it goes, kept in a log
+        rtsim fly manual_flight --pilot mavlink --ground  # you fly; in another terminal: rtsim joystick
+        rtsim fly ep21_steep_turn --protection full  # too much bank asked for, and the law acts
+        rtsim fly --start cruise --duration 30 --turbulence moderate  # a held start in turbulence
+        rtsim fly --headless --record flight.rrd --speed max --json  # a recorded view and every number
     """
     from rtsim.realtime.policy import OverrunPolicy
     from rtsim.units import deg, kt
@@ -223,7 +238,8 @@ def fly_command(
     from scenarios.flight.preflight import preflight_problems
     from telemetry.exchange.globe import HomePosition
 
-    OverrunPolicy.parse(overrun_policy)
+    if overrun_policy is not None:
+        OverrunPolicy.parse(overrun_policy)
     overrides = Overrides(
         **options,
         turbulence=turbulence,
@@ -354,9 +370,10 @@ def _fly(
     speed: float,
     view: ViewOptions | None,
     outputs: dict[str, Any],
-    policy: str,
+    policy: str | None,
 ) -> tuple[FlightRecord, float | None, int]:
     """Fly and summarize; gives the record, when it began, and the exit code where a signal ended it (else 0)."""
+    from rtsim.cli.flight_screen import FlightScreen
     from rtsim.realtime.control import FlightControl
     from rtsim.realtime.keys import KEY_HELP, KeyReader
 
@@ -367,27 +384,30 @@ def _fly(
         if place is not None
     ]
     describe(scenario, speed=speed, outputs=places)
-    screen = FlightScreen(scenario, control, paced=not math.isinf(speed))
+    by_hand = outputs["mavlink"] is not None
+    screen = FlightScreen(scenario, control, paced=not math.isinf(speed), by_hand=by_hand)
     from scenarios.flight.runner import FlightOutputs, fly
 
-    with _stopping_signals(control) as signals, KeyReader(control) as keys:
+    with _stopping_signals(control) as signals, KeyReader(control, on_help=lambda: screen.say(KEY_HELP)) as keys:
         if keys.active and not math.isinf(speed):
-            say(f"Keys: {KEY_HELP}")
+            say("Keys: space pauses, q quits, ? lists the others.")
 
         def on_start() -> None:
+            ready()
             NOTICE.flies()
             signals.arm()
             screen.first_frame_s = process_age_s()
 
+        preparing = working("Preparing the flight" if not math.isinf(speed) else "")
         wanted = FlightOutputs(
             **outputs,
             view=view,
-            on_message=say,
+            on_message=screen.say,
             on_rows=screen.on_rows,
             on_event=screen.on_event,
             on_start=on_start,
         )
-        with screen.running():
+        with screen.running(), preparing as ready:
             flight = fly(
                 scenario,
                 speed="max" if math.isinf(speed) else speed,

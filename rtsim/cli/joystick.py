@@ -33,21 +33,33 @@ def register(app: typer.Typer) -> None:
 def joystick_command(
     *,
     keyboard: Annotated[bool, typer.Option("--keyboard", help="Fly with the keyboard of this terminal.")] = False,
-    device: Annotated[str | None, typer.Option(help="Number of the gamepad, or a part of its name.")] = None,
-    stick_map: Annotated[str | None, typer.Option("--map", help="Gamepad map: a name or a .toml file.")] = None,
+    device: Annotated[
+        str | None, typer.Option(help="Number of the gamepad, or a part of its name.", show_default="the first")
+    ] = None,
+    stick_map: Annotated[
+        str | None, typer.Option("--map", help="Gamepad map: a name or a .toml file.", show_default="the one that fits")
+    ] = None,
     listen: Annotated[str | None, typer.Option(help="Wait for a vehicle on HOST:PORT.", show_default=_LISTEN)] = None,
-    connect: Annotated[str | None, typer.Option(help="Call the vehicle at HOST:PORT instead of waiting.")] = None,
+    connect: Annotated[
+        str | None, typer.Option(help="Call the vehicle at HOST:PORT instead of waiting.", show_default="it waits")
+    ] = None,
     rate: Annotated[float, typer.Option(help="Messages per second [Hz].", min=5.0, max=200.0)] = 50.0,
     wizard: Annotated[
-        Path | None, typer.Option(help="Find out what your device's axes and buttons are, and write FILE.")
+        Path | None,
+        typer.Option(help="Find out what your device's axes and buttons are, and write FILE.", show_default="none"),
     ] = None,
     list_devices: Annotated[bool, typer.Option("--list", help="List gamepads and maps, then end.")] = False,
-    duration: Annotated[float | None, typer.Option(help="End after so many seconds.")] = None,
+    duration: Annotated[float | None, typer.Option(help="End after so many seconds.", show_default="at Ctrl-C")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout at the end.")] = False,
 ) -> None:
     """Fly a MAVLink vehicle with a gamepad or the keyboard: MANUAL_CONTROL at 50 Hz.
 
     Start the aircraft first, in another terminal: rtsim fly manual_flight --pilot mavlink
+
+    Examples:
+        rtsim joystick  # the first gamepad
+        rtsim joystick --keyboard  # the keys of this terminal
+        rtsim joystick --wizard mine.toml  # find out the axes of an unknown device
     """
     from telemetry.exchange.endpoint import Endpoint
     from telemetry.joystick.sender import Sender

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.help_text import App
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 def register(app: typer.Typer) -> None:
     """Add the commands to the app."""
     app.command("plot")(plot_command)
-    group = typer.Typer(no_args_is_help=True, help="What a flight log holds; CSV and MAT for other programs.")
+    group = App(help="What a flight log holds; CSV and MAT for other programs.")
     group.command("info")(info_command)
     group.command("export")(export_command)
     app.add_typer(group, name="log")
@@ -29,10 +30,16 @@ def register(app: typer.Typer) -> None:
 def plot_command(
     log: LogArgument,
     *,
-    out: Annotated[Path | None, typer.Option(help="Directory for the pictures (LOG's name with -plots).")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory for the pictures.", show_default="LOG's name with -plots")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Draw a recorded flight: corridor, time histories, controls, flapping, margins, timing; as SVG and PNG."""
+    """Draw a recorded flight: corridor, time histories, controls, flapping, margins, timing; as SVG and PNG.
+
+    Examples:
+        rtsim plot turn.parquet  # pictures into turn-plots
+    """
     from telemetry.log.flight_plots import plot_flight
     from telemetry.log.reader import read_log
 
@@ -47,7 +54,11 @@ def plot_command(
 
 
 def info_command(log: LogArgument, *, json: JsonOption = False) -> None:
-    """Say what a log holds, and whether its rows still have the hash it was closed with."""
+    """Say what a log holds, and whether its rows still have the hash it was closed with.
+
+    Examples:
+        rtsim log info turn.parquet
+    """
     from telemetry.log.reader import read_log
 
     flight = read_log(log)
@@ -64,13 +75,18 @@ def export_command(
     *,
     json: JsonOption = False,
 ) -> None:
-    """Write all signals of a log to a CSV or MAT file."""
+    """Write all signals of a log to a CSV or MAT file.
+
+    Examples:
+        rtsim log export turn.parquet turn.csv
+    """
     from telemetry.log.export import export_log
     from telemetry.log.reader import read_log
 
     check_writable(target)
-    flight = read_log(log)
-    export_log(flight, target)
+    with working(f"Writing {target.name}"):
+        flight = read_log(log)
+        export_log(flight, target)
     if json:
         emit_json({"log": log, "file": target, "frames": len(flight.rows), "signals": list(flight.names)})
     else:

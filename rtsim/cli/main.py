@@ -18,6 +18,7 @@ from rtsim import __version__
 from rtsim.cli import stopping
 from rtsim.cli.build_text import build_notice
 from rtsim.cli.compile_text import compile_notice
+from rtsim.cli.help_text import App
 from rtsim.cli.options import with_values
 from rtsim.cli.output import machine_output
 from rtsim.cli.surroundings import leave_settings_of_others
@@ -27,29 +28,13 @@ EXIT_INTERNAL_ERROR = 70
 EXIT_BROKEN_PIPE = 141
 EXIT_INTERRUPTED = 130
 
-COMMAND_MODULES = (
-    "fly",
-    "scenarios",
-    "replay",
-    "analysis",
-    "rotor",
-    "performance",
-    "corridor",
-    "pilot",
-    "model",
-    "log",
-    "check",
-    "timing",
-    "test",
-    "campaign",
-    "breaking",
-    "optimize",
-    "reproduce",
-    "validate",
-    "joystick",
-    "flightgear",
-)
-"""Modules of ``rtsim.cli`` in the order of ``rtsim --help``; each has ``register(app)``."""
+COMMAND_MODULES = {
+    "Fly": ("fly", "scenarios", "joystick", "flightgear", "timing"),
+    "Look at a flight": ("log", "replay"),
+    "Look at the aircraft": ("analysis", "rotor", "performance", "corridor", "model", "pilot", "validate"),
+    "Test and search": ("check", "test", "campaign", "breaking", "optimize", "reproduce"),
+}
+"""Modules of ``rtsim.cli`` under the headings of ``rtsim --help``; each has ``register(app)``."""
 
 
 def database_hash() -> str:
@@ -77,32 +62,35 @@ def _root(
         ),
     ] = False,
 ) -> None:
-    """Fly the Bell XV-15 tiltrotor in real time, a virtual pilot at the stick, its conversion corridor beside it.
+    """Fly the Bell XV-15 tiltrotor in real time: a virtual pilot or you at the controls, its corridor beside it.
 
-    Start with: rtsim fly
+    Begin with:
+        rtsim fly  # hover to airplane mode in 66 s; the viewer opens where there is a display
+        rtsim scenarios  # what else there is to fly
+        rtsim fly conversion_turn --log turn.parquet  # the same with a turn, kept in a log
+        rtsim plot turn.parquet  # pictures of it
+        rtsim fly manual_flight --pilot mavlink  # fly it yourself: in another terminal, rtsim joystick
+        rtsim test ep21_steep_turn  # a flight as a test of the protection, with a verdict
+        rtsim COMMAND --help  # every option of a command, with examples
     """
 
 
 def build_app() -> typer.Typer:
     """Build the command with every command module registered."""
-    app = typer.Typer(
+    app = App(
         name="rtsim",
-        no_args_is_help=True,
-        add_completion=False,
         pretty_exceptions_enable=False,
-        rich_markup_mode="markdown",  # units in square brackets are text, not markup
-        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     )
     app.callback()(_root)
-    for name in COMMAND_MODULES:
-        module_name = f"rtsim.cli.{name}"
-        try:
-            module = importlib.import_module(module_name)
-        except ModuleNotFoundError as missing:
-            if missing.name != module_name:
-                raise
-            continue
-        module.register(app)
+    for heading, names in COMMAND_MODULES.items():
+        before = len(app.registered_commands), len(app.registered_groups)
+        for name in names:
+            importlib.import_module(f"rtsim.cli.{name}").register(app)
+        for command in app.registered_commands[before[0] :]:
+            command.rich_help_panel = heading
+        for group in app.registered_groups[before[1] :]:
+            group.rich_help_panel = heading
     return app
 
 
@@ -216,9 +204,22 @@ def _usage_error(error: Exception, message: str) -> int:
     """Tell a mistake in the command line, and where its help is."""
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else "rtsim"
-    if type(error).__name__ != "NoArgsIsHelpError":  # the parser has printed the help already
-        _fail(f"{message.rstrip('.')}. Try '{path} --help'.")
+    if type(error).__name__ == "NoArgsIsHelpError":
+        sys.stdout.write(f"{message}\n")
+    else:
+        ending = "" if message.endswith("?") else "."
+        _fail(f"{message.rstrip('.')}{ending}{_perhaps_a_scenario(message)} Try '{path} --help'.")
     return EXIT_BAD_INPUT
+
+
+def _perhaps_a_scenario(message: str) -> str:
+    """What to type where a scenario's name stands in the place of a command."""
+    word = message.partition("No such command '")[2].partition("'")[0]
+    if not word:
+        return ""
+    from scenarios.files.loader import library_names
+
+    return f" It is a scenario: rtsim fly {word}." if word in library_names() else ""
 
 
 def main() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.help_text import App
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import InputError
@@ -26,7 +27,7 @@ _JOBS = 2
 
 def register(app: typer.Typer) -> None:
     """Add the command group to the app."""
-    group = typer.Typer(no_args_is_help=True, help="The LPV database: trim map, linear models and pilot gains.")
+    group = App(help="The LPV database: trim map, linear models and pilot gains.")
     group.callback()(_group)
     group.command("build")(build_command)
     group.command("info")(info_command)
@@ -54,7 +55,11 @@ def build_command(
     without_pilot: Annotated[bool, typer.Option("--without-pilot", help="Leave the pilot's gains out.")] = False,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
-    """Build the database from the nonlinear model: trims, linear models, and the pilot's gains at every grid point."""
+    """Build the database from the nonlinear model: trims, linear models, and the pilot's gains at every grid point.
+
+    Examples:
+        rtsim model build --weight-lb 11000 --density-altitude-ft 4000  # ahead of flights there
+    """
     from rtsim.aircraft.condition import SHIPPED as SHIPPED_CONDITION
     from rtsim.lpv.files.kept_databases import place_for
     from rtsim.lpv.files.netcdf import SHIPPED
@@ -76,11 +81,15 @@ def build_command(
 
 
 def info_command(
-    file: Annotated[Path | None, typer.Argument(help="Database file; the default is the shipped one.")] = None,
+    file: Annotated[Path | None, typer.Argument(help="Database file.", show_default="the shipped one")] = None,
     *,
     json: Annotated[bool, _JSON] = False,
 ) -> None:
-    """Say what a database holds: grid, variables, condition, pilots, hash, and how dense its grid is."""
+    """Say what a database holds: grid, variables, condition, pilots, hash, and how dense its grid is.
+
+    Examples:
+        rtsim model info
+    """
     from rtsim.lpv.files.netcdf import SHIPPED
     from rtsim.lpv.files.storage import load_database
 
@@ -95,9 +104,13 @@ def info_command(
 def export_command(
     file: Annotated[Path, typer.Argument(help="File to write, .nc or .mat.")],
     *,
-    database: Annotated[Path | None, typer.Option(help="Database to export; the default is the shipped one.")] = None,
+    database: Annotated[Path | None, typer.Option(help="Database to export.", show_default="the shipped one")] = None,
 ) -> None:
-    """Write the database for other programs: NetCDF (.nc) or MATLAB (.mat)."""
+    """Write the database for other programs: NetCDF (.nc) or MATLAB (.mat).
+
+    Examples:
+        rtsim model export xv15.mat
+    """
     from rtsim.lpv.files.storage import load_database, save_database
 
     _require_suffix(file)
@@ -110,7 +123,7 @@ def import_command(
     file: Annotated[Path, typer.Argument(help="A database of your own, .nc or .mat (layout: docs/lpv.md).")],
     *,
     out: Annotated[
-        Path | None, typer.Option(help="NetCDF file to write; default: beside FILE, named *.rtsim.nc.")
+        Path | None, typer.Option(help="NetCDF file to write.", show_default="beside FILE, named *.rtsim.nc")
     ] = None,
     design_pilots: Annotated[
         bool, typer.Option("--design-pilots", help="Design the MOCM for it, in place of the gains it carries.")
@@ -121,6 +134,9 @@ def import_command(
 
     Fly it with 'rtsim fly --database FILE', look at it with 'rtsim trim --database FILE', or take it into Python with
     rtsim.load_aircraft(FILE).
+
+    Examples:
+        rtsim model import mine.mat --design-pilots
     """
     from rtsim.lpv.files.storage import load_database, save_database
 
@@ -223,8 +239,10 @@ def _print_summary(result: dict[str, Any]) -> None:
     from rich.table import Table
 
     table = Table(title=result["file"], show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
     for name, value in result["attributes"].items():
-        table.add_row(name, str(value))
+        table.add_row(name, f"{value:.7g}" if isinstance(value, float) else str(value))
     speeds, angles = result["airspeed_kt"], result["nacelle_deg"]
     table.add_row("hash", result["content_hash"])
     if result["current"] is not None:

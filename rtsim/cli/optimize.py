@@ -11,7 +11,7 @@ import typer
 
 from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
 from rtsim.cli.options import takes_options
-from rtsim.cli.output import console, emit_json, results
+from rtsim.cli.output import console, emit_json, results, working
 from rtsim.errors import InputError
 from rtsim.loop.options import CONDITION, declared
 from rtsim.whole_file import check_writable, write_whole
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from rtsim.optimization.spec import SearchSpec
 
 _OWN = "the specification's"
+
+
+def _own(default: str) -> str:
+    return f"{_OWN}, else {default}"
 
 
 def register(app: typer.Typer) -> None:
@@ -41,7 +45,7 @@ def optimize_command(
         list[str] | None,
         typer.Option(
             help="What to minimize; repeat for a Pareto front (with --method nsga2).",
-            show_default=_OWN,
+            show_default=_own("flapping_integral"),
         ),
     ] = None,
     like: Annotated[
@@ -50,18 +54,22 @@ def optimize_command(
             help="Constraint set of a path of the paper: typical, near_stall, centre_line, ...", show_default="none"
         ),
     ] = None,
-    generations: Annotated[int | None, typer.Option(help="Generations to search.", show_default=_OWN)] = None,
-    population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default=_OWN)] = None,
-    seed: Annotated[int | None, typer.Option(help="Root of the search's random stream.", show_default=_OWN)] = None,
-    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.", show_default=_OWN)] = None,
-    handling: Annotated[
-        str | None, typer.Option(help="Constraints by feasibility or by penalty.", show_default=_OWN)
+    generations: Annotated[int | None, typer.Option(help="Generations to search.", show_default=_own("40"))] = None,
+    population: Annotated[int | None, typer.Option(help="Candidates per generation.", show_default=_own("32"))] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Root of the search's random stream.", show_default=_own("0"))
     ] = None,
-    points: Annotated[int | None, typer.Option(help="Free points of the path.", show_default=_OWN)] = None,
-    nacelle_rate_deg_s: Annotated[float | None, typer.Option(help="Nacelle rate [deg/s].", show_default=_OWN)] = None,
+    method: Annotated[str | None, typer.Option(help="cma-es, ga or nsga2.", show_default=_own("cma-es"))] = None,
+    handling: Annotated[
+        str | None, typer.Option(help="Constraints by feasibility or by penalty.", show_default=_own("feasibility"))
+    ] = None,
+    points: Annotated[int | None, typer.Option(help="Free points of the path.", show_default=_own("7"))] = None,
+    nacelle_rate_deg_s: Annotated[
+        float | None, typer.Option(help="Nacelle rate [deg/s].", show_default=_own("3"))
+    ] = None,
     robust: Annotated[
         int | None,
-        typer.Option(help="Flights in turbulence that judge each path; 0: calm air.", show_default=_OWN),
+        typer.Option(help="Flights in turbulence that judge each path; 0: calm air.", show_default=_own("0")),
     ] = None,
     options: dict[str, Any],
     jobs: Annotated[
@@ -74,7 +82,12 @@ def optimize_command(
     no_check: Annotated[bool, typer.Option("--no-check", help="Leave the nonlinear check flight out.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Search the best conversion path by flying every candidate in the closed loop."""
+    """Search the best conversion path by flying every candidate in the closed loop.
+
+    Examples:
+        rtsim optimize --out best.toml  # the paper's search, some minutes
+        rtsim optimize --like typical --generations 10 --out quick.toml
+    """
     changes = {
         "objectives": objective,
         "points": points,
@@ -142,13 +155,13 @@ def _progress_bar(generations: int) -> Iterator[Callable[[Progress], None]]:
 
     columns = (
         TextColumn("Searching"),
-        BarColumn(),
+        BarColumn(bar_width=16),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.fields[best]}"),
     )
-    with Bar(*columns, console=console.real()) as bar:
+    with Bar(*columns, console=console.real(), redirect_stderr=False) as bar:
         task = bar.add_task("search", total=generations, best="")
 
         def told(progress: Progress) -> None:
@@ -202,8 +215,8 @@ def _save(
             for point in result.front
         ]
     if check and problem.has_nonlinear_model:
-        console.print("Flying the winner on the nonlinear model; the first such flight compiles it (up to 60 s).")
-        checked = nonlinear_check(problem, path)
+        with working("Flying the winner on the nonlinear model"):
+            checked = nonlinear_check(problem, path)
         summary["nonlinear_check"] = figures_summary(checked)
     return summary
 

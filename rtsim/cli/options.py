@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 import inspect
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
 
+from rtsim.cli.completion import one_of
 from rtsim.loop.options import Option, declared
 
 PANELS = ("Who flies what", "Start", "Air", "Loop", "Outputs", "MAVLink")
@@ -56,7 +58,7 @@ def takes_options(*names: str, own: str = "the scenario's") -> Callable[[Command
         parameters = []
         for parameter in signature.parameters.values():
             if parameter.name == "options":
-                parameters += [_parameter(item, own, item.panel if not names else None) for item in offered]
+                parameters += [_parameter(item, own, item.panel) for item in offered]
             else:
                 parameters.append(parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY))
         parameters.sort(key=_panel)
@@ -81,13 +83,20 @@ def _parameter(item: Option, own: str, panel: str | None) -> inspect.Parameter:
     described = typer.Option(
         "/".join(flags),
         help=f"{item.help.removesuffix('.')} [{item.unit}]." if item.unit else item.help,
-        show_default=f"{own}, {item.default_text}",
+        show_default=f"{own}, else {item.default_text}",
         rich_help_panel=panel,
         metavar="A,B" if item.is_list else None,
+        autocompletion=one_of(*words) if (words := _words(item)) else None,
     )
     return inspect.Parameter(
         item.name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, described]
     )
+
+
+def _words(item: Option) -> list[str]:
+    """Single words that a text may be, of what its declaration tells."""
+    told = (word.strip() for word in item.values.partition(";")[0].split(","))
+    return [word for word in told if re.fullmatch("[a-z]+", word)]
 
 
 def _flown(item: Option, value: Any) -> Any:

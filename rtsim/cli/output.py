@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Literal, Protocol, TextIO
 
@@ -106,6 +106,24 @@ class Advance(Protocol):
         """
 
 
+_shown: list[Callable[[str], None]] = []
+"""The bars that are up, the innermost last: each shows words about what is done right now."""
+
+
+def tell_bar(words: str) -> bool:
+    """Show words about what is done right now in the bar that is up.
+
+    Args:
+        words: What is done.
+
+    Returns:
+        Whether there is one.
+    """
+    if _shown:
+        _shown[-1](words)
+    return bool(_shown)
+
+
 @contextmanager
 def progress(description: str, *, total: float) -> Iterator[Advance]:
     """Show a progress bar with the time left on stderr while the block runs.
@@ -128,11 +146,38 @@ def progress(description: str, *, total: float) -> Iterator[Advance]:
 
     columns = (
         TextColumn("{task.description}"),
-        BarColumn(),
+        BarColumn(bar_width=16),
         TaskProgressColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
+        TextColumn("{task.fields[now]}"),
     )
-    with Progress(*columns, console=console.real(), transient=False) as bar:
-        task = bar.add_task(description, total=total)
-        yield lambda amount, words="": bar.update(task, advance=amount, description=words or None)
+    with Progress(*columns, console=console.real(), redirect_stderr=False) as bar:
+        task = bar.add_task(description, total=total, now="")
+        _shown.append(lambda words: bar.update(task, now=words))
+        try:
+            yield lambda amount, words="": bar.update(task, advance=amount, description=words or None, now="")
+        finally:
+            bar.update(task, now="")
+            _shown.pop()
+
+
+@contextmanager
+def working(description: str) -> Iterator[Callable[[], None]]:
+    """Show on a terminal what is being done and for how long, while the block runs; nothing in a pipe.
+
+    Args:
+        description: What is being done, as a short present participle ("Solving trims"); empty shows nothing.
+
+    Yields:
+        What takes it away before the end.
+    """
+    if not sys.stderr.isatty() or not description:
+        yield lambda: None
+        return
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console.real(), transient=True, redirect_stderr=False) as bar:
+        bar.add_task(description, total=None)
+        yield bar.stop

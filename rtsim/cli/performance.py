@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from rtsim.cli.output import emit_json, results
+from rtsim.cli.output import emit_json, results, working
 from rtsim.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 # Nacelle angle [deg], airspeeds in which the fastest climb is looked for, and one to speed up from [kn].
 _SEARCHED = ((90.0, range(20, 101, 10), 40.0), (75.0, range(30, 131, 10), 80.0), (0.0, range(90, 201, 10), 170.0))
 _WORDS = {
-    "power": "the engines give no more",
-    "torque": "the masts bear no more torque",
+    "power": "the engines end it",
+    "torque": "the masts end it",
     "trim": "no trim beyond",
-    "range": "the end of what is searched",
+    "range": "the search ends",
 }
 
 
@@ -56,6 +56,9 @@ def performance_command(
 
     Solved by the nonlinear model on a standard day, out of ground effect, with the published power of the engines at
     that altitude and the published torque limits of the masts. It takes some seconds.
+
+    Examples:
+        rtsim performance --weight-lb 11000 --altitude-ft 5000
     """
     from rtsim.faults.fault import EngineRating
 
@@ -70,7 +73,8 @@ def performance_command(
     if rating is not None and rating not in get_args(EngineRating):
         allowed = ", ".join(get_args(EngineRating))
         raise InputError("is not a rating", key="--rating", value=rating, allowed=allowed, mend="choose one")
-    result = _figures(weight_lb, altitude_ft, cg_in, rotor_rpm, rating)  # type: ignore[arg-type]  # one of these, just checked
+    with working("Solving hover, climb and level flight"):
+        result = _figures(weight_lb, altitude_ft, cg_in, rotor_rpm, rating)  # type: ignore[arg-type]  # one of these, just checked
     if json:
         emit_json(result)
     else:
@@ -143,7 +147,7 @@ def _number(value: float) -> float | None:
 def _print(result: dict[str, Any]) -> None:
     def say(what: str, found: dict[str, Any], figure: str) -> None:
         why = "" if figure == "none" else _WORDS[found["limit"]]
-        line = f"{what:24} {found['rotor_rpm']:3.0f} rpm  {found['rating']:11} {figure:24} {why}"
+        line = f"{what:21} {found['rotor_rpm']:3.0f} rpm {found['rating']:8} {figure:21} {why}"
         results.print(line.rstrip(), highlight=False, markup=False, soft_wrap=True)
 
     at = f"{result['altitude_ft']:g} ft"

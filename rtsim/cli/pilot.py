@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.help_text import App
 from rtsim.cli.output import console, emit_json, results
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_EXPECTATION_FAILED, InputError
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command group to the app."""
-    group = typer.Typer(no_args_is_help=True, help="Design the virtual pilot (Modified Optimal Control Model).")
+    group = App(help="Design the virtual pilot (Modified Optimal Control Model).")
     group.callback()(_group)
     group.command("design")(design_command)
     app.add_typer(group, name="pilot")
@@ -29,13 +30,16 @@ def _group() -> None:
 def design_command(
     file: Annotated[Path, typer.Argument(help="TOML file with [case.NAME.input] tables (docs/pilot.md).")],
     *,
-    case: Annotated[str | None, typer.Option(help="Solve only this case.")] = None,
+    case: Annotated[str | None, typer.Option(help="Solve only this case.", show_default="all of them")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Solve pilot-model problems: gains, noise, RMS, margins.
 
     Without --case every case of the file is solved, its rejects must be refused with their code, and values
     under [case.NAME.expect] are compared.
+
+    Examples:
+        rtsim pilot design cases.toml --case ks2
     """
     from rtsim.pilot.cases import load_cases
 

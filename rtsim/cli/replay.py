@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from rtsim.cli.flight_text import say
-from rtsim.cli.output import emit_json, results
+from rtsim.cli.output import emit_json, results, working
 from rtsim.errors import EXIT_EXPECTATION_FAILED
 
 
@@ -25,10 +25,15 @@ def replay_command(
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs."""
+    """Fly a log's commands again; exit 1 and the first differing frame and signal where the history differs.
+
+    Examples:
+        rtsim replay turn.parquet  # the same SHA-256, or where it differs
+    """
     from scenarios.flight.replay import replay_log
 
-    result = replay_log(log, trust=trust)
+    with working(f"Flying {log.name} again"):
+        result = replay_log(log, trust=trust)
     for change in result.changed_versions:
         say(f"Not the same as when it was recorded: {change}.")
     if not result.complete:

@@ -23,7 +23,9 @@ def register(app: typer.Typer) -> None:
 def reproduce_command(
     *,
     out: Annotated[Path, typer.Option(help="Directory for the report, the claims and the figures.")],
-    jobs: Annotated[int | None, typer.Option(help="Processes that fly; default one per core.", min=1, max=256)] = None,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes that fly.", show_default="one per core", min=1, max=256)
+    ] = None,
     database: Annotated[
         Path | None, typer.Option(help="Another LPV database of the XV-15.", show_default="the shipped XV-15")
     ] = None,
@@ -31,7 +33,11 @@ def reproduce_command(
 ) -> None:
     """Regenerate the paper's figures from flights, judge its claims and write a report.
 
-    A claim that does not hold is a result, not a fault: the exit code is 0 whenever the report is written.
+    The paper is "Simulation of tiltrotor maneuvers using linear parameter varying models"; the README says what we know
+    of it. A claim that does not hold is a result, not a fault: the exit code is 0 whenever the report is written.
+
+    Examples:
+        rtsim reproduce --out report
     """
     from scenarios.reproduction.run import reproduce, total_work
 

@@ -37,6 +37,10 @@ def rotor_command(
 
     In forward flight the longitudinal cyclic is trimmed to zero longitudinal flapping; the model has no lateral
     cyclic, so the lateral flapping that is left is reported. Where the rotor stalls before that thrust: exit 2.
+
+    Examples:
+        rtsim rotor --thrust-coefficient 0.01 --tip-mach 0.69  # a hover
+        rtsim rotor --thrust-coefficient 0.003 --tip-mach 0.6 --advance-ratio 0.5
     """
     from rtsim.analysis.isolated_rotor import IsolatedRotor, RotorCondition, rotor_answer
 

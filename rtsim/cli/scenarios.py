@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.completion import scenario_names
 from rtsim.cli.output import emit_json, results
 
 if TYPE_CHECKING:
@@ -29,11 +30,21 @@ def register(app: typer.Typer) -> None:
 def scenarios_command(
     *,
     names: Annotated[
-        list[str] | None, typer.Argument(help="Scenarios to describe, by name or file.", show_default="(the library)")
+        list[str] | None,
+        typer.Argument(
+            help="Scenarios to describe, by name or file.",
+            show_default="the library",
+            autocompletion=scenario_names,
+        ),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """List the scenarios that come with rtsim; with names, describe these. Fly one with `rtsim fly NAME`."""
+    """List the scenarios that come with rtsim; with names, describe these. Fly one with `rtsim fly NAME`.
+
+    Examples:
+        rtsim scenarios  # the library, by kind
+        rtsim scenarios conversion_turn hover  # what these two fly and expect
+    """
     from scenarios.files.loader import library_names, load_scenario
 
     found = [load_scenario(name) for name in names or library_names()]

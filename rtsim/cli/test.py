@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.cli.completion import scenario_names
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import EXIT_EXPECTATION_FAILED, InputError, RtsimError
@@ -27,7 +28,11 @@ def register(app: typer.Typer) -> None:
 def run_tests(
     paths: Annotated[
         list[str] | None,
-        typer.Argument(help="Scenario names, .toml files or folders of them.", show_default="the whole library"),
+        typer.Argument(
+            help="Scenario names, .toml files or folders of them.",
+            show_default="the whole library",
+            autocompletion=scenario_names,
+        ),
     ] = None,
     *,
     protection: Annotated[
@@ -42,7 +47,13 @@ def run_tests(
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
-    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails."""
+    """Fly scenarios as tests: with a protection law and, with the same seed, without; exit 1 where one fails.
+
+    Examples:
+        rtsim test ep21_steep_turn  # one flight, with a verdict
+        rtsim test tests/flights --junit results.xml --out failures  # a folder of them, for CI
+        rtsim test --plant nonlinear --html report.html  # the library on the nonlinear model
+    """
     for file, folder in ((junit, False), (html, False), (out, True)):
         if file is not None:
             check_writable(file, folder=folder)
@@ -114,6 +125,7 @@ def _flown(scenarios: list[Scenario], protection: str | None, options: dict[str,
     cases = []
     with progress("Testing", total=len(scenarios)) as advance:
         for scenario in scenarios:
+            advance(0, f"Testing {scenario.name}")
             try:
                 cases.append(tester.run(scenario))
             except RtsimError as error:
@@ -172,8 +184,7 @@ def _print(cases: list[Case]) -> None:
     laws = {case.law for case in cases}
     if len(laws) == 1:
         results.print(f"law under test: {cases[0].law}", markup=False, soft_wrap=True)
-    caption = "kn outside the corridor at the deepest, with the law and without"
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), caption=caption, caption_justify="left")
+    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("scenario", no_wrap=True)
     table.add_column("kind", no_wrap=True)
     if len(laws) > 1:
@@ -192,6 +203,7 @@ def _print(cases: list[Case]) -> None:
             *(f"{values['depth_kt']:.1f}" if values else "" for values in (case.metrics, case.off_metrics)),
         )
     results.print(table)
+    results.print("kn out: outside the corridor at the deepest, with the law; off: without it", soft_wrap=True)
     for case in cases:
         words = [case.error] if case.error else [f"{item.name}: {item.sentence}" for item in case.failures]
         words += [case.note] if case.note else []

@@ -26,12 +26,15 @@ def validate_command(
     sensitivity: Annotated[
         bool, typer.Option("--sensitivity", help="Also move every uncertain input to both ends of its range.")
     ] = False,
-    jobs: Annotated[int | None, typer.Option(help="Processes; default one per core.", min=1, max=256)] = None,
+    jobs: Annotated[int | None, typer.Option(help="Processes.", show_default="one per core", min=1, max=256)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")] = False,
 ) -> None:
     """Compare the aircraft model with everything published about the XV-15 and write a report.
 
     A check that misses its band is a result, not a fault: the exit code is 0 whenever the report is written.
+
+    Examples:
+        rtsim validate --out report
     """
     from rtsim.validation.report import total_work, write_report
 

@@ -71,7 +71,9 @@ class FlightControl:
         self.poll: Callable[[], None] | None = None
         """Called every few milliseconds while the flight stands still, so that whoever asks from outside is heard."""
         self.speed = 1.0
-        """Present speed in multiples of real time; infinite while it is not paced."""
+        """Speed asked for, in multiples of real time; infinite while it is not paced."""
+        self.behind_s = 0.0
+        """How far the last frame began behind its schedule [s]."""
 
     def pause(self) -> None:
         """Stand still after the frame that is being flown."""

@@ -2,8 +2,8 @@
 
 The deadline of frame k of a section is ``anchor + k * period``; a late frame never moves the later ones, and no frame
 is skipped. A new section, with a new anchor, begins where the schedule changes on purpose: after a pause, at a change
-of speed, and when pacing is switched on. Time inside the flight is ``frame * dt`` whatever the wall clock does, so a
-flight that was paused, warped or late has the same history as one that was not.
+of speed, when pacing is switched on, and where the policy drops a backlog. Time inside the flight is ``frame * dt``
+whatever the wall clock does, so a flight that was paused, warped or late has the same history as one that was not.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rtsim.arrays import FloatArray
 from rtsim.frame import TIMING_SIGNALS
 from rtsim.realtime.clock import wait_until
 from rtsim.realtime.control import ControlRequest, FlightControl, checked_speed, neighbouring_warp
-from rtsim.realtime.policy import OverrunPolicy
+from rtsim.realtime.policy import BACKLOG_S, OverrunPolicy
 from rtsim.realtime.report import Ending, Spread, TimingLog, TimingReport, microseconds
 from rtsim.realtime.source import FrameSource
 
@@ -125,6 +125,10 @@ class Executive:
         """One paced frame: wait, fly, show, measure, keep."""
         deadline = self._deadline(self._section_frames)
         start = wait_until(deadline)
+        late_s = self.control.behind_s = (start - deadline) * 1e-9
+        if late_s > BACKLOG_S and self.policy.drops:
+            self._slip_frames += (start - deadline) / self._period_ns
+            self._begin_section(start)
         cpu = time.thread_time_ns()
         row = self.source.step()
         self.sink.view(row, self._timing)
@@ -237,9 +241,10 @@ class Executive:
             source.disturb(request.change)
 
     def _change_speed(self, speed: float) -> None:
-        """Go on at another speed; a backlog stays a backlog."""
+        """Go on at another speed; a short backlog stays, a long one is that of a speed this machine did not reach."""
         next_deadline = self._deadline(self._section_frames)
-        if math.inf in {self._speed, speed} or self.control.paused:
+        behind_s = (time.perf_counter_ns() - next_deadline) * 1e-9
+        if math.inf in {self._speed, speed} or self.control.paused or behind_s > BACKLOG_S:
             self._end_section(wait=False)
             next_deadline = time.perf_counter_ns()
         self._speed = self.control.speed = speed

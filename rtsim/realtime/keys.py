@@ -8,6 +8,7 @@ import select
 import sys
 import termios
 import threading
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
@@ -15,7 +16,7 @@ from rtsim.realtime.control import FlightControl
 from rtsim.terminal import in_foreground, take_keys
 
 KEY_HELP = (
-    "space pause, . one frame, + - warp, r reset, p pilot, o override protection, t rate damping, "
+    "Keys: space pause, . one frame, + - speed, 0 reset, p pilot, o override protection, t rate damping, "
     "h attitude retention, u automatic flaps, v b flaps down up, g rotor-speed governor, q quit"
 )
 """What the keys do, for the user."""
@@ -45,7 +46,7 @@ def press(control: FlightControl, key: str) -> None:
         control.faster()
     elif key in {"-", "_"}:
         control.slower()
-    elif key == "r":
+    elif key == "0":
         control.reset()
     elif key == "p":
         control.set_pilot("next")
@@ -62,14 +63,17 @@ def press(control: FlightControl, key: str) -> None:
 class KeyReader:
     """Reads keys from the terminal while the ``with`` block runs; does nothing where stdin is no terminal."""
 
-    def __init__(self, control: FlightControl, *, descriptor: int | None = None) -> None:
+    def __init__(
+        self, control: FlightControl, *, descriptor: int | None = None, on_help: Callable[[], None] | None = None
+    ) -> None:
         """Prepare; the terminal is not touched before the block begins.
 
         Args:
             control: The flight the keys act on.
             descriptor: The terminal; None takes standard input.
+            on_help: Called for the key ``?``.
         """
-        self._control = control
+        self._control, self._on_help = control, on_help
         self._descriptor = _standard_input() if descriptor is None else descriptor
         self._saved: list[Any] | None = None
         self._closing = threading.Event()
@@ -121,6 +125,8 @@ class KeyReader:
             if not text:
                 return
             for key in text:
+                if key == "?" and self._on_help is not None:
+                    self._on_help()
                 press(self._control, key)
 
 

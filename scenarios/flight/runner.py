@@ -103,7 +103,7 @@ def fly(
     speed: float | Literal["max"] = 1.0,
     overrides: Overrides | None = None,
     control: FlightControl | None = None,
-    overrun_policy: str = "catch-up",
+    overrun_policy: str | None = None,
     outputs: FlightOutputs | None = None,
 ) -> FlightRecord:
     """Fly a scenario to its end.
@@ -113,7 +113,8 @@ def fly(
         speed: Multiple of real time, or ``max``.
         overrides: What to change of the scenario.
         control: The hand on the flight (pause, step, warp, reset, pilot, stop), usable from another thread.
-        overrun_policy: ``catch-up`` or ``stop:N``.
+        overrun_policy: ``catch-up``, ``drop`` or ``stop:N``; None drops a backlog where hands can reach the flight by
+            MAVLink, and else catches up.
         outputs: Log, view and callbacks.
 
     Returns:
@@ -130,7 +131,7 @@ def fly(
     scenario = _chosen(scenario, overrides)
     if speed != "max":
         checked_speed(speed)
-    policy = OverrunPolicy.parse(overrun_policy)
+    policy = OverrunPolicy.parse(overrun_policy or "catch-up")
     pilot_factory = load_pilot(scenario.options.pilot)
     nacelle_law = load_nacelle_law(scenario.options.nacelle)
     live = speed != "max"
@@ -159,6 +160,7 @@ def fly(
         sinks = FlightSinks(
             log=log,
             view=view,
+            paced=live,
             mirrors=[mirror for mirror in (link, window) if mirror is not None],
             watch_corridor=scenario.options.protection != "off",
             limits=_limit_watch(scenario, simulation.dt),
@@ -175,7 +177,11 @@ def fly(
             link.wait_ready()
             _tell_where(link, outputs)
         executive = Executive(
-            session, sinks, control=control, speed=math.inf if speed == "max" else speed, policy=policy
+            session,
+            sinks,
+            control=control,
+            speed=math.inf if speed == "max" else speed,
+            policy=OverrunPolicy(drops=True) if hands is not None and overrun_policy is None else policy,
         )
         if outputs.on_start is not None:
             outputs.on_start()

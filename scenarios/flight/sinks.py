@@ -205,6 +205,7 @@ class FlightSinks:
         log: RowLog | None = None,
         view: RowView | None = None,
         mirrors: Sequence[RowMirror] = (),
+        paced: bool = True,
         watch_corridor: bool = True,
         limits: Callable[[Callable[[LogEvent], None]], LimitWatch] | None = None,
         on_rows: Callable[[FloatArray], None] | None = None,
@@ -216,6 +217,7 @@ class FlightSinks:
             log: Keeps every row and event.
             view: Shows what it can.
             mirrors: Shown every row of a paced flight beside the view (MAVLink, FlightGear).
+            paced: Whether the flight begins on the wall clock, not in blocks.
             watch_corridor: Make events of changes of the corridor level.
             limits: Makes what watches limits and protection from whom it tells; None: nobody watches.
             on_rows: Told the last row flown (progress and status lines); must be quick.
@@ -223,6 +225,10 @@ class FlightSinks:
         """
         self.history = History()
         self.events: list[LogEvent] = []
+        self._noted: list[LogEvent] = []
+        self._in_blocks = (
+            not paced
+        )  # events of a flight flown in blocks wait for the end of theirs, to be told in order
         self._log, self._view, self._on_rows, self._on_event = log, view, on_rows, on_event
         self._view_told = 0
         self._lateness_us = 0.0
@@ -245,6 +251,7 @@ class FlightSinks:
 
     def record(self, row: FloatArray, timing: FloatArray) -> None:
         """Keep a row."""
+        self._tell_in_order(in_blocks=False)
         self.history.append(row)
         if self._log is not None:
             self._log.push(row, timing)
@@ -269,6 +276,7 @@ class FlightSinks:
         """Show and keep many rows."""
         if not len(rows):
             return
+        self._in_blocks = True
         self.history.extend(rows)
         if self._log is not None:
             self._log.push_block(rows)
@@ -287,19 +295,37 @@ class FlightSinks:
         if self._limits is not None:
             self._limits.flush()
             self._limits.rows(rows)
+        self._tell_in_order(in_blocks=True)
         if self._on_rows is not None:
             self._on_rows(rows[-1])
 
     def watched(self) -> dict[str, Any]:
-        """What was seen of limits and protection, for the summary; empty where nobody watched."""
-        return self._limits.summary() if self._limits is not None else {}
+        """What was seen of limits and protection, for the summary; empty where nobody watched. No row may follow."""
+        seen = self._limits.summary() if self._limits is not None else {}
+        self._tell_in_order(in_blocks=False)
+        return seen
 
     def event(self, event: LogEvent) -> None:
-        """Keep and show an event.
+        """Keep and show an event, after those of earlier frames.
 
         Args:
             event: What happened.
         """
+        if self._in_blocks:
+            self._noted.append(event)
+            return
+        if self._limits is not None:
+            self._limits.flush()  # the rows before it may have events of their own
+        self._tell(event)
+
+    def _tell_in_order(self, *, in_blocks: bool) -> None:
+        """Tell what was noted; whether further events wait, too."""
+        self._in_blocks = in_blocks
+        noted, self._noted = self._noted, []
+        for event in sorted(noted, key=lambda event: event.frame):
+            self._tell(event)
+
+    def _tell(self, event: LogEvent) -> None:
         self.events.append(event)
         if self._log is not None:
             self._log.event(event)
@@ -384,8 +410,8 @@ class FlightSinks:
         text = (
             "corridor clear again"
             if level == 0
-            else f"corridor {name}: {margin:.1f} kn from the {side}-speed side at {row[COLUMN.airspeed_kt]:.0f} kn, "
-            f"nacelle {row[COLUMN.nacelle_deg]:.0f} deg"
+            else f"corridor {name}: {abs(margin):.1f} kn {'beyond' if margin < 0.0 else 'from'} the {side}-speed side "
+            f"at {row[COLUMN.airspeed_kt]:.0f} kn, nacelle {row[COLUMN.nacelle_deg]:.0f} deg"
         )
         self.event(
             LogEvent(

@@ -149,7 +149,7 @@ def time_axis(axes: Axes, label: str, *, last: bool = True) -> None:
 
 
 def save_figures(
-    study: Study, plans: Sequence[FigurePlan], directory: Path, *, drawn: Callable[[float], None]
+    study: Study, plans: Sequence[FigurePlan], directory: Path, *, drawn: Callable[[float, str], None]
 ) -> dict[int, list[Path]]:
     """Draw figures into files.
 
@@ -157,7 +157,7 @@ def save_figures(
         study: What was flown.
         plans: The figures.
         directory: Where they go; pictures of the same name are replaced.
-        drawn: Called with 1 after each figure.
+        drawn: Called with 1 and words after each figure.
 
     Returns:
         The files of each figure by number, SVG first.
@@ -174,5 +174,5 @@ def save_figures(
             figure.suptitle(f"Figure {plan.number}. {plan.title}", x=0.01, ha="left", fontsize=10.5)
             plan.draw(study, figure)
             files[plan.number] = list(save_both(figure, directory, plan.stem).values())
-            drawn(1.0)
+            drawn(1.0, "Drawing the figures")
     return files

@@ -32,14 +32,14 @@ class Reproduction:
 
 
 def reproduce(
-    out: Path, *, jobs: int = 1, progress: Callable[[float], None] | None = None, database: str = ""
+    out: Path, *, jobs: int = 1, progress: Callable[[float, str], None] | None = None, database: str = ""
 ) -> Reproduction:
     """Regenerate the paper's figures and judge its claims.
 
     Args:
         out: Directory for the report (``report.html``), the claims (``claims.json``) and the figures; made if needed.
         jobs: Processes to use; the result does not depend on it.
-        progress: Called with the work done since the last call; it adds up to :func:`total_work`.
+        progress: Called with the work done since the last call and what is done now; it adds up to :func:`total_work`.
         database: LPV database that is flown, a file; empty: the shipped XV-15.
 
     Returns:
@@ -49,7 +49,7 @@ def reproduce(
         InputError: ``out`` is a file, or the database cannot be used.
         OutputError: A file cannot be written.
     """
-    advance = progress if progress is not None else lambda _: None
+    advance = progress if progress is not None else lambda *_: None
     if out.exists() and not out.is_dir():
         raise InputError("is a file", key="--out", value=str(out), mend="name a directory")
     try:

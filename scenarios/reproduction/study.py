@@ -76,7 +76,7 @@ def work_amount(variants: tuple[Variant, ...] = VARIANTS) -> int:
 def run_study(
     *,
     jobs: int = 1,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float, str], None] | None = None,
     variants: tuple[Variant, ...] = VARIANTS,
     database: str = "",
 ) -> Study:
@@ -84,7 +84,7 @@ def run_study(
 
     Args:
         jobs: Processes to use; the result does not depend on it.
-        progress: Called with the work done since the last call; it adds up to :func:`work_amount`.
+        progress: Called with the work done since the last call and what is done now; it adds up to :func:`work_amount`.
         variants: Who flies; the first one is what counts. ``nonlinear`` and ``two-variable`` must be among them.
         database: LPV database that is flown, a file; empty: the shipped XV-15.
 
@@ -118,9 +118,9 @@ def run_study(
             base.flights["typical"], flown[PLAIN].flights["typical"], flown[TRUTH].flights["typical"]
         ),
     }
-    advance(1.0)
+    advance(1.0, "Judging the claims")
     facts |= grid_errors(database)
-    advance(1.0)
+    advance(1.0, "Judging the claims")
     evidence = {variant.name: Evidence(flown[variant.name].measures, facts) for variant in variants}
     others = {variant: evidence[variant.name] for variant in variants[1:]}
     return Study(
@@ -142,10 +142,11 @@ def _tasks(variants: tuple[Variant, ...]) -> list[tuple[Variant, tuple[str, ...]
     return tasks
 
 
-def _all_flown(variants: tuple[Variant, ...], jobs: int, advance: Callable[[float], None]) -> Iterator[_Flown]:
+def _all_flown(variants: tuple[Variant, ...], jobs: int, advance: Callable[[float, str], None]) -> Iterator[_Flown]:
     tasks = _tasks(variants)
     for part in work(_fly_variant, tasks, jobs=jobs):
-        advance(len(part.measures) + (DESIGN_WEIGHT if part.variant.pilot is not None else 0))
+        done = len(part.measures) + (DESIGN_WEIGHT if part.variant.pilot is not None else 0)
+        advance(done, f"Flying the paper, {part.variant.name}")
         yield part
 
 
@@ -174,5 +175,5 @@ def _fly_variant(variant: Variant, names: tuple[str, ...]) -> _Flown:
     return _Flown(variant, measures, flights)
 
 
-def _ignore(_: float) -> None:
+def _ignore(_amount: float, _words: str) -> None:
     pass

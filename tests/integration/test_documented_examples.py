@@ -8,6 +8,7 @@ import shlex
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -50,6 +51,13 @@ def test_the_pilot_case_is_solved_and_its_reject_refused(tmp_path: Path) -> None
     file = tmp_path / "cases.toml"
     file.write_text(block("pilot.md", "toml", "[case.ks2.input]"), encoding="utf-8")
     assert run(["pilot", "design", str(file)]) == 0
+
+
+def test_the_pilot_of_a_plant_of_ones_own_is_designed() -> None:
+    names: dict[str, Any] = {}
+    exec(compile(block("pilot.md", "python", "rtsim.design_mocm"), "pilot.md", "exec"), names)
+    assert names["pilot"].statistics.rms_y[0] > 0.0
+    assert names["pilot"].margins().phase_margin[0] > 0.0
 
 
 def test_a_database_of_ones_own_is_used_as_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -67,6 +67,26 @@ def test_a_stall_is_an_overrun_and_is_caught_up(make_source: Any, sink: Any) -> 
     assert counts[20] < counts[21]
 
 
+def test_a_dropped_backlog_costs_no_frame_and_is_not_flown_faster(make_source: Any, sink: Any) -> None:
+    control = FlightControl()
+    behind: list[float] = []
+    acts = {20: lambda: time.sleep(0.5), 22: lambda: behind.append(control.behind_s)}
+    report = Executive(make_source(60, at=acts), sink, control=control, policy=OverrunPolicy.parse("drop")).fly()
+    assert sink.frames == list(range(60))
+    assert behind[0] < 0.25  # caught up, frame 22 would begin 0.49 s late
+    assert report.drift_frames is not None
+    assert report.drift_frames > 100.0  # what was dropped is booked
+
+
+def test_another_speed_does_not_fly_a_long_backlog_off(make_source: Any, sink: Any) -> None:
+    control = FlightControl()
+    behind: list[float] = []
+    acts = {20: lambda: (time.sleep(0.5), control.slower()), 23: lambda: behind.append(control.behind_s)}
+    Executive(make_source(60, at=acts), sink, control=control, speed=5.0).fly()
+    assert sink.frames == list(range(60))
+    assert behind[0] < 0.25
+
+
 def test_the_stop_policy_ends_the_flight_at_the_nth_overrun(make_source: Any, sink: Any) -> None:
     source = make_source(1000, work_s=0.006)
     report = Executive(source, sink, policy=OverrunPolicy.parse("stop:5")).fly()
@@ -178,12 +198,12 @@ def test_the_collector_is_off_inside_and_restored_after(make_source: Any, sink: 
 
 @pytest.mark.parametrize("text", ["", "stop", "stop:0", "stop:-1", "stop:x", "catchup", "stop:9999999999"])
 def test_other_policies_are_refused(text: str) -> None:
-    with pytest.raises(InputError, match="catch-up, or stop:N"):
+    with pytest.raises(InputError, match="catch-up, drop, or stop:N"):
         OverrunPolicy.parse(text)
 
 
 def test_policies_read_back() -> None:
-    for text in ("catch-up", "stop:1", "stop:250"):
+    for text in ("catch-up", "drop", "stop:1", "stop:250"):
         assert str(OverrunPolicy.parse(text)) == text
 
 

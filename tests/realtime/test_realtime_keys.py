@@ -19,7 +19,7 @@ from rtsim.realtime.keys import KeyReader, press
 @pytest.mark.parametrize(
     ("key", "action"),
     [
-        (" ", "toggle-pause"), (".", "step"), ("+", "faster"), ("-", "slower"), ("r", "reset"), ("p", "pilot"),
+        (" ", "toggle-pause"), (".", "step"), ("+", "faster"), ("-", "slower"), ("0", "reset"), ("p", "pilot"),
         ("q", "stop"),
     ],
 )  # fmt: skip

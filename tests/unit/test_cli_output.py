@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -10,12 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtsim.cli.flight_text import status_line
-from rtsim.cli.output import console, emit_json, progress, results
+from rtsim.cli.output import console, emit_json, progress, results, tell_bar, working
 from rtsim.errors import OutputError
-from rtsim.frame import COLUMN, SIGNAL_COUNT
 from rtsim.jsonable import to_jsonable
-from rtsim.realtime.control import FlightControl
 from rtsim.whole_file import whole_file
 
 
@@ -120,13 +119,35 @@ def test_a_unit_in_brackets_is_printed_and_not_taken_for_a_style(capsys):
     assert "margin [kn]" in told
 
 
-@pytest.mark.parametrize("width", [40, 80, 200])
-def test_the_status_line_says_what_has_room_and_never_wraps(width: int) -> None:
-    row = np.zeros(SIGNAL_COUNT)
-    row[COLUMN.time_s], row[COLUMN.airspeed_kt], row[COLUMN.altitude_m] = 1234.5, -188.8, 1234.5
-    row[COLUMN.margin_kt], row[COLUMN.heading_deg], row[COLUMN.bank_deg] = -12.3, 359.6, -30.0
-    line = status_line(row, FlightControl(), width=width)
-    assert len(line) < width, "the last column would begin another line"
-    assert line.startswith("1234.5 s     1x  -188.8 kn")
-    assert ("hdg 000  bank -30" in line) == (width >= 80)
-    assert ("flapping" in line) == (width == 200)
+class Terminal(io.StringIO):
+    """A terminal that keeps what it is sent."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_bar_shows_what_is_done_now_and_a_spinner_leaves_nothing_behind(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    assert not tell_bar("compiling 1/2"), "no bar is up"
+    with progress("Testing", total=2) as advance:
+        assert tell_bar("compiling 1/2")
+        advance(1, "Testing turn")
+        assert tell_bar("compiling 2/2")
+        advance(1)
+    told = sys.stderr.getvalue()
+    assert "compiling 2/2" not in told.splitlines()[-1]
+    assert "Testing turn" in told
+    assert not tell_bar("too late")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with working("Solving") as done:
+        done()
+    assert "Solving" in sys.stderr.getvalue()
+    assert sys.stderr.getvalue().endswith("\x1b[2K"), "its line is taken away"
+
+
+def test_a_spinner_says_nothing_in_a_pipe(capsys):
+    with working("Solving") as done:
+        done()
+    assert capsys.readouterr() == ("", "")

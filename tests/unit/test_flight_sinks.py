@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
+import pytest
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN, SIGNAL_COUNT, TIMING_SIGNALS
 from scenarios.flight.sinks import FlightSinks
+from telemetry.log.format import LogEvent
 
 
 class TalkingView:
@@ -60,3 +64,54 @@ def test_a_flight_that_stood_still_leaves_an_event_and_one_that_catches_up_no_mo
     assert [(event.frame, event.kind, event.text) for event in sinks.events] == [
         (2, "standstill", "the flight stood still for 3.0 s")
     ]
+
+
+class LateWatch:
+    """Limits that are looked at when ten rows are there, or when somebody asks."""
+
+    def __init__(self, tell: Callable[[LogEvent], None]) -> None:
+        self.tell, self.waiting = tell, list[FloatArray]()
+
+    def row(self, row: FloatArray) -> None:
+        self.waiting.append(row.copy())
+        if len(self.waiting) == 10:
+            self.flush()
+
+    def flush(self) -> None:
+        rows, self.waiting = self.waiting, []
+        self.rows(rows)
+
+    def rows(self, rows: Iterable[FloatArray]) -> None:
+        for flown in rows:
+            if flown[COLUMN.frame] % 3 == 0:
+                self.tell(LogEvent(int(flown[COLUMN.frame]), 0.0, "limit", "near"))
+
+    def summary(self) -> dict[str, object]:
+        self.flush()
+        return {}
+
+
+@pytest.mark.parametrize("paced", [True, False])
+def test_events_are_told_in_the_order_of_their_frames(paced: bool) -> None:
+    heard: list[LogEvent] = []
+    sinks = FlightSinks(paced=paced, limits=LateWatch, on_event=heard.append)  # type: ignore[arg-type]
+    rows = np.stack([row(frame) for frame in range(25)])
+    rows[7:12, COLUMN.corridor_level] = 1.0
+    timing = np.zeros(len(TIMING_SIGNALS))
+    for start in (0, 10, 20):
+        sinks.event(LogEvent(start, 0.0, "pilot", "switched"))  # a session tells before the rows of its block
+        block = rows[start : start + 10]
+        if paced:
+            for flown in block:
+                sinks.record(flown, timing)
+        else:
+            sinks.event(LogEvent(start + len(block) - 1, 0.0, "law", "failed"))
+            sinks.block(block)
+    sinks.watched()
+    sinks.event(LogEvent(25, 0.1, "end", "over"))
+    frames = [event.frame for event in heard]
+    assert frames == sorted(frames)
+    assert frames == [event.frame for event in sinks.events]
+    kinds = {"pilot", "limit", "corridor", "end"} | (set() if paced else {"law"})
+    assert {event.kind for event in heard} == kinds
+    assert [event.frame for event in heard if event.kind == "corridor"] == [7, 12]
