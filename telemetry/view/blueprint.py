@@ -8,8 +8,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from telemetry.log.signal_groups import plot_groups
+from telemetry.view import cockpit, ground_map
 from telemetry.view import corridor as rerun_corridor
-from telemetry.view import ground_map
 from telemetry.view import instruments as rerun_instruments
 from telemetry.view.colours import BACKGROUND
 from telemetry.view.options import Layout
@@ -52,13 +52,12 @@ def blueprint(layout: Layout) -> Any:
 
 
 def _pilot(*, follow: bool) -> Any:
-    """Aircraft, instruments and corridor large; four plots, the events and the map below."""
+    """Window, corridor and instruments large; map, events, plots and states one behind the other."""
     plots = [_time_series(path, title, follow=follow) for path, (title, _) in PILOT_PLOTS.items()]
-    top = rrb.Horizontal(_flight(), _instruments(), _corridor(), column_shares=[4.6, 4.35, 4.35])
-    bottom = rrb.Horizontal(
-        rrb.Grid(*plots, grid_columns=4), _modes(follow=follow), _events(), _map(), column_shares=[6.4, 1.8, 3.2, 2.1]
-    )
-    return rrb.Vertical(top, bottom, row_shares=[2.0, 1.0])
+    behind = rrb.Tabs(_map(), _events(), rrb.Grid(*plots, grid_columns=2, name="Plots"), _modes(follow=follow))
+    below = rrb.Horizontal(_corridor(bare=True), behind)
+    left = rrb.Vertical(_flight(), below, row_shares=[1.1, 1.0])
+    return rrb.Horizontal(left, _instruments(), column_shares=[1.38, 1.0])
 
 
 def _engineer(*, follow: bool) -> Any:
@@ -84,35 +83,68 @@ def _engineer(*, follow: bool) -> Any:
     )
 
 
-def _flight() -> Any:
-    return rrb.Spatial3DView(
-        origin="world/chase",
-        contents=["/world/**"],
-        name="Flight",
-        background=rrb.Background(color=(66, 92, 124)),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=(-16.0, -12.5, -9.2), look_target=(0.2, -0.9, -0.5), eye_up=(0, 0, -1)
+def _flight(*, cockpit_first: bool = False) -> Any:
+    """The flight from behind the aircraft and from the pilot's seat, one behind the other."""
+    return rrb.Tabs(_chase(), _cockpit(), active_tab=int(cockpit_first))
+
+
+def _chase() -> Any:
+    return _eye(
+        "world/chase",
+        "Chase",
+        ["/world/**", "- /world/aircraft/cockpit"],
+        rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=(-19.0, -8.6, -6.6), look_target=(0.6, -0.2, -1.6), eye_up=(0, 0, -1)
         ),
-        line_grid=rrb.LineGrid3D(visible=False),
-        spatial_information=rrb.SpatialInformation(target_frame="tf#/world/chase", show_axes=False),
     )
 
 
-def _flat(origin: str, name: str, bounds: tuple[tuple[float, float], tuple[float, float]]) -> Any:
+def _cockpit() -> Any:
+    ahead, right, down = cockpit.EYE
+    target = (ahead + 1.0, right, down + cockpit.LOOKS_DOWN)
+    hidden = ("world/aircraft/body", "world/trail", "world/rose", "world/wind")
+    return _eye(
+        "world/aircraft",
+        "Cockpit",
+        ["/world/**", *(f"- /{path}/**" for path in hidden)],
+        rrb.EyeControls3D(kind=rrb.Eye3DKind.FirstPerson, position=cockpit.EYE, look_target=target, eye_up=(0, 0, -1)),
+    )
+
+
+def _eye(origin: str, name: str, contents: list[str], eye: Any) -> Any:
+    """A view of the world from a frame that moves."""
+    scenery = ("/world/horizon", "/world/ground", "/world/runway", "/world/rose")
+    return rrb.Spatial3DView(
+        origin=origin,
+        contents=contents,
+        name=name,
+        background=rrb.Background(color=(206, 216, 222)),
+        eye_controls=eye,
+        line_grid=rrb.LineGrid3D(visible=False),
+        spatial_information=rrb.SpatialInformation(target_frame=f"tf#/{origin}", show_axes=False),
+        overrides={path: rrb.EntityBehavior(interactive=False) for path in scenery},
+    )
+
+
+def _flat(
+    origin: str, name: str, bounds: tuple[tuple[float, float], tuple[float, float]], *, bare: bool = False
+) -> Any:
+    """A drawing; bare, it needs no title."""
     return rrb.Spatial2DView(
         origin=origin,
         name=name,
+        titlebar=not bare,
         background=rrb.Background(color=BACKGROUND),
         visual_bounds=rrb.VisualBounds2D(x_range=bounds[0], y_range=bounds[1]),
     )
 
 
 def _instruments() -> Any:
-    return _flat("instruments", "Instruments", rerun_instruments.BOUNDS)
+    return _flat("instruments", "Instruments", rerun_instruments.BOUNDS, bare=True)
 
 
-def _corridor() -> Any:
-    return _flat("corridor", "Conversion corridor", rerun_corridor.BOUNDS)
+def _corridor(*, bare: bool = False) -> Any:
+    return _flat("corridor", "Conversion corridor", rerun_corridor.BOUNDS, bare=bare)
 
 
 def _map() -> Any:

@@ -94,12 +94,12 @@ def test_text_is_aligned(align: str, left: float) -> None:
 def test_layouts_name_only_entities_that_are_logged(layout: str) -> None:
     views = list(_views(blueprint(layout).root_container))
     origins = {str(view.origin).strip("/") for view in views}
-    known = {"world/chase", "instruments", "corridor", "map", "events", "events/log"} | {
+    known = {"world/chase", "world/aircraft", "instruments", "corridor", "map", "events", "events/log"} | {
         group.path for group in plot_groups()
     }
     known |= set(PILOT_PLOTS)
     assert origins <= known
-    assert {"world/chase", "corridor", "map", "events", "events/log"} <= origins
+    assert {"world/chase", "world/aircraft", "corridor", "map", "events", "events/log"} <= origins
     if layout == "engineer":
         assert {group.path for group in plot_groups()} <= origins, "the engineer sees every signal"
 
