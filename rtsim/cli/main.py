@@ -30,6 +30,7 @@ EXIT_INTERRUPTED = 130
 COMMAND_MODULES = (
     "fly",
     "scenarios",
+    "view",
     "replay",
     "analysis",
     "rotor",

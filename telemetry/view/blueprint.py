@@ -1,4 +1,4 @@
-"""How the views are laid out when the viewer opens: for the pilot, for the engineer, for replay."""
+"""How the views are laid out when the viewer opens: for the pilot, the engineer, replay, two flights compared."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from telemetry.view import corridor as rerun_corridor
 from telemetry.view import instruments as rerun_instruments
 from telemetry.view.colours import BACKGROUND
 from telemetry.view.options import Layout
+from telemetry.view.overlay import COMPARED
 from telemetry.view.plots import PILOT_PLOTS
 
 SHOWN_SECONDS = 30.0
@@ -32,12 +33,15 @@ def blueprint(layout: Layout) -> Any:
     """The layout of that name.
 
     Args:
-        layout: ``pilot``, ``engineer`` or ``replay``.
+        layout: ``pilot``, ``engineer``, ``replay`` or ``compare``.
     """
-    replay = layout == "replay"
-    content = _engineer(follow=True) if layout == "engineer" else _pilot(follow=not replay)
-    if replay:
-        time_panel = rrb.TimePanel(state="expanded", timeline="sim_time", play_state="Paused")
+    afterwards = layout in {"replay", "compare"}
+    if layout == "compare":
+        content = _compare()
+    else:
+        content = _engineer(follow=True) if layout == "engineer" else _pilot(follow=not afterwards)
+    if afterwards:
+        time_panel = rrb.TimePanel(state="collapsed", timeline="sim_time", play_state="Playing")
     else:
         time_panel = rrb.TimePanel(state="collapsed", timeline="sim_time", play_state="Following")
     return rrb.Blueprint(
@@ -49,6 +53,20 @@ def blueprint(layout: Layout) -> Any:
         auto_views=False,
         auto_layout=False,
     )
+
+
+def _compare() -> Any:
+    """Two flights: window and corridor on the left; on the right what each did, and the difference beside it."""
+    plots = []
+    for number, (name, (title, _, unit)) in enumerate(COMPARED.items()):
+        plots.append(_time_series(f"compare/{name}", f"{title} [{unit}]", follow=False, legend=not number))
+        plots.append(_time_series(f"difference/{name}", f"B less A [{unit}]", follow=False, legend=False))
+    apart = _time_series("difference/apart", "Apart [m]", follow=False, legend=False)
+    below = rrb.Horizontal(_corridor(bare=True), rrb.Tabs(apart, _events(), _map(), _modes(follow=False)))
+    left = rrb.Vertical(_flight(), below, row_shares=[1.1, 1.0])
+    side_by_side = rrb.Grid(*plots, grid_columns=2, name="Side by side")
+    right = rrb.Tabs(side_by_side, _instruments(), active_tab=0)
+    return rrb.Horizontal(left, right, column_shares=[1.25, 1.0])
 
 
 def _pilot(*, follow: bool) -> Any:

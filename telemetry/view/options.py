@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-Layout = Literal["pilot", "engineer", "replay"]
+Layout = Literal["pilot", "engineer", "replay", "compare"]
 """Layouts with which the viewer opens."""
 
 

@@ -87,6 +87,11 @@ class Streamer:
         """Where a viewer connects."""
         return None if self._port is None else f"rerun+http://127.0.0.1:{self._port}/proxy"
 
+    @property
+    def recording(self) -> Any:
+        """The ``rerun.RecordingStream`` of the present run."""
+        return self._recording
+
     def take(self, rows: FloatArray) -> None:
         """Show new rows.
 
