@@ -5,12 +5,14 @@ from __future__ import annotations
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from rtsim.cli.output import console, emit_json, progress, results
 from rtsim.errors import InputError, OutputError
+
+Layout = Literal["pilot", "cockpit", "engineer", "compare"]
 
 if TYPE_CHECKING:
     from telemetry.log.reader import FlightLog
@@ -36,7 +38,8 @@ def view_command(
     other: Annotated[Path | None, typer.Argument(help="Another, which is laid over it as a ghost.")] = None,
     *,
     layout: Annotated[
-        Literal["pilot", "engineer", "compare"] | None, typer.Option(help="Layout (pilot; compare with two logs).")
+        Literal["pilot", "cockpit", "engineer", "compare"] | None,
+        typer.Option(help="Layout (pilot; compare with two logs)."),
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Keep the recording for Rerun, NAME.rrd.")] = None,
     headless: Annotated[bool, typer.Option("--headless", help="Open no viewer.")] = False,
@@ -56,14 +59,16 @@ def view_command(
         raise InputError(why, key="--record", mend="give --record FILE.rrd")
     logs = [read_log(path) for path in (log, other) if path is not None]
     if layout == "compare" and other is None:
-        raise InputError("a comparison needs two logs", key="--layout", value=layout, allowed="pilot, engineer")
+        raise InputError(
+            "a comparison needs two logs", key="--layout", value=layout, allowed="pilot, cockpit, engineer"
+        )
     flights = flights_of(logs)
     found = greatest_differences(logs) if other is not None else None
     if found is not None:
         _tell_corridors(logs)
         if not json:
             results.print(_in_words(found, flights[1].name, flights[0].name), markup=False, soft_wrap=True)
-    chosen: Any = layout or ("compare" if other is not None else "replay")
+    chosen: Layout = layout or ("compare" if other is not None else "pilot")
     with tempfile.TemporaryDirectory(prefix="rtsim-view-") as folder:
         recording = record or Path(folder) / "flight.rrd"
         _record(logs, recording, chosen)
@@ -75,7 +80,7 @@ def view_command(
         results.print(str(record), markup=False, soft_wrap=True)
 
 
-def _record(logs: list[FlightLog], recording: Path, layout: Any) -> None:
+def _record(logs: list[FlightLog], recording: Path, layout: Layout) -> None:
     from telemetry.view.logged import record_logs
 
     with progress("Drawing the flight", total=1.0) as advance:
@@ -88,7 +93,7 @@ def _show(recording: Path) -> None:
     from telemetry.view.viewer import Viewer
 
     try:
-        viewer = Viewer(ViewOptions(layout="replay"), str(recording))
+        viewer = Viewer(ViewOptions(), str(recording))
     except OSError as failure:
         raise OutputError(f"The viewer cannot be started ({failure}); --record keeps the recording.") from failure
     console.print("The viewer is open; close its window or press Ctrl-C to end.")

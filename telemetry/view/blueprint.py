@@ -29,21 +29,21 @@ ENGINEER_TABS: dict[str, tuple[str, ...]] = {
 """Tabs of the engineer's layout and the groups of signals in each; the first takes those that are nowhere else."""
 
 
-def blueprint(layout: Layout) -> Any:
+def blueprint(layout: Layout, *, replay: bool = False) -> Any:
     """The layout of that name.
 
     Args:
-        layout: ``pilot``, ``engineer``, ``replay`` or ``compare``.
+        layout: ``pilot``, ``cockpit`` (the same from the seat), ``engineer`` or ``compare``.
+        replay: What is shown has been flown: play it from its start, with curves over all of it.
     """
-    afterwards = layout in {"replay", "compare"}
     if layout == "compare":
         content = _compare()
+    elif layout == "engineer":
+        content = _engineer(follow=not replay)
     else:
-        content = _engineer(follow=True) if layout == "engineer" else _pilot(follow=not afterwards)
-    if afterwards:
-        time_panel = rrb.TimePanel(state="collapsed", timeline="sim_time", play_state="Playing")
-    else:
-        time_panel = rrb.TimePanel(state="collapsed", timeline="sim_time", play_state="Following")
+        content = _pilot(follow=not replay, cockpit_first=layout == "cockpit")
+    state: Any = "Playing" if replay else "Following"
+    time_panel = rrb.TimePanel(state="collapsed", timeline="sim_time", play_state=state)
     return rrb.Blueprint(
         content,
         time_panel,
@@ -69,12 +69,12 @@ def _compare() -> Any:
     return rrb.Horizontal(left, right, column_shares=[1.25, 1.0])
 
 
-def _pilot(*, follow: bool) -> Any:
+def _pilot(*, follow: bool, cockpit_first: bool) -> Any:
     """Window, corridor and instruments large; map, events, plots and states one behind the other."""
     plots = [_time_series(path, title, follow=follow) for path, (title, _) in PILOT_PLOTS.items()]
     behind = rrb.Tabs(_map(), _events(), rrb.Grid(*plots, grid_columns=2, name="Plots"), _modes(follow=follow))
     below = rrb.Horizontal(_corridor(bare=True), behind)
-    left = rrb.Vertical(_flight(), below, row_shares=[1.1, 1.0])
+    left = rrb.Vertical(_flight(cockpit_first=cockpit_first), below, row_shares=[1.1, 1.0])
     return rrb.Horizontal(left, _instruments(), column_shares=[1.38, 1.0])
 
 

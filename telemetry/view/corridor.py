@@ -15,7 +15,7 @@ from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.colours import CYAN, DIM, FRAME, GRID, HIGH_SIDE, LEVELS, LOW_SIDE, TEXT, TRAIL, WHITE
-from telemetry.view.strokes import Align, Colour, LineArt
+from telemetry.view.strokes import Align, Colour, LineArt, text_width
 
 UNITS_PER_DEGREE = 2.7
 """Vertical scale."""
@@ -29,6 +29,8 @@ TURN_STEP = 0.04
 """Steps of load factor in which the sides of a turn are drawn: 2 kn at most."""
 TRAIL_POINTS = 400
 """Longest trail, in points half a second apart."""
+
+_MARGIN_HEIGHT = 14.0
 
 
 def height_of(nacelle_deg: float) -> float:
@@ -115,16 +117,12 @@ class CorridorPlot:
             art.line([[speed, y], [end, y]], colour, radius=-1.2)
             art.line([[end, y - 3.0], [end, y + 3.0]], colour, radius=-1.4)
             above = y - 13.0 if y > 30.0 else y + 14.0
+            words = f"{margin:+.0f}"
+            half = 0.5 * text_width(words, _MARGIN_HEIGHT) + 5.0
             # Between point and boundary if there is room, else beyond the boundary.
-            away = margin + 22.0 if 0.0 <= margin < 46.0 else 24.0
+            away = margin + half if 0.0 <= margin < 2.0 * half else half
             art.text(
-                f"{margin:+.0f}",
-                speed + direction * away,
-                above,
-                height=14.0,
-                colour=colour,
-                align="centre",
-                weight=1.2,
+                words, speed + direction * away, above, height=_MARGIN_HEIGHT, colour=colour, align="centre", weight=1.2
             )
 
 

@@ -254,8 +254,8 @@ def _draw_speed_limits(art: LineArt, row: FloatArray) -> None:
 def _draw_windows(art: LineArt, row: FloatArray) -> None:
     """Large airspeed and altitude in the middle of their tapes, rates below."""
     for side, text, rate in (
-        (-1.0, f"{np.round(row[COLUMN.airspeed_kt]) + 0.0:.0f}", f"{row[COLUMN.airspeed_rate_kt_s]:+.1f} kn/s"),
-        (1.0, f"{row[COLUMN.altitude_m]:.1f}", f"{row[COLUMN.climb_rate_m_s]:+.1f} m/s"),
+        (-1.0, f"{np.round(row[COLUMN.airspeed_kt]) + 0.0:.0f}", f"{_tenth(row[COLUMN.airspeed_rate_kt_s]):+.1f} kn/s"),
+        (1.0, f"{row[COLUMN.altitude_m]:.1f}", f"{_tenth(row[COLUMN.climb_rate_m_s]):+.1f} m/s"),
     ):
         near, far = side * (_BALL_EDGE + 10.0), side * _TAPE_EDGE
         left, right = min(near, far), max(near, far)
@@ -270,13 +270,18 @@ def _draw_windows(art: LineArt, row: FloatArray) -> None:
     tilted = f"  bank {abs(bank):.0f} {'R' if bank > 0.0 else 'L'}" if abs(bank) >= 0.5 else ""
     half = 58.0 if tilted else 34.0
     art.bar(-half, _TOP + 3.0, half, _TOP + 15.0, colour=BACKGROUND)
-    words = f"pitch {row[COLUMN.pitch_deg]:+.1f}{tilted}"
+    words = f"pitch {_tenth(row[COLUMN.pitch_deg]):+.1f}{tilted}"
     art.text(words, 0.0, _TOP + 9.0, height=6.0, colour=WHITE, align="centre")
     middle = 0.5 * (_BALL_BOTTOM + _BOTTOM) + 0.5
     art.line([[-11.0, middle], [11.0, middle]], BACKGROUND, radius=8.5)
     art.box(-19.0, middle - 9.0, 19.0, middle + 9.0, colour=WHITE)
     heading = f"{np.round(row[COLUMN.heading_deg]) % 360.0:03.0f}"
     art.text(heading, 0.0, middle, height=11.0, colour=WHITE, align="centre", weight=1.25)
+
+
+def _tenth(value: float) -> float:
+    """A value as it is written, without the minus of what is nothing."""
+    return float(np.round(value, 1)) + 0.0
 
 
 def _draw_bank_and_slip(art: LineArt, row: FloatArray) -> None:

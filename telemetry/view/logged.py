@@ -59,7 +59,7 @@ def record_logs(
     first = flights[0]
     held = claim(record)
     try:
-        options = ViewOptions(viewer=False, record=record, layout=layout)
+        options = ViewOptions(viewer=False, record=record, layout=layout, replay=True)
         title = " and ".join(flight.name for flight in flights)
         streamer = Streamer(options, outline=logs[0].metadata.corridor, title=title, rate_hz=first.rate_hz, port=None)
         overlay = Overlay(streamer.recording, flights) if len(flights) > 1 else None

@@ -129,6 +129,11 @@ class Streamer:
             self._recording.set_time("sim_time", duration=0.0)
         self._plots.event(text, level)
 
+    def flush(self) -> None:
+        """Send everything that was taken."""
+        self._send_plots()
+        self._recording.flush(timeout_sec=10.0)
+
     def close(self, *, linger_s: float = 0.0) -> list[Path]:
         """Send what is left and finish the files.
 
@@ -182,7 +187,7 @@ class Streamer:
         self._instruments = Instruments(recording)
         self._map = GroundMap(recording)
         self._plots = Plots(recording)
-        recording.send_blueprint(blueprint(self._options.layout))
+        recording.send_blueprint(blueprint(self._options.layout, replay=self._options.replay))
         # What is seen until the first row comes, which overwrites it: a helicopter at rest.
         waiting = np.zeros(SIGNAL_COUNT)
         waiting[COLUMN.nacelle_deg], waiting[COLUMN.altitude_m] = 90.0, 100.0
