@@ -21,9 +21,12 @@ SHOWN_SECONDS = 30.0
 
 
 ENGINEER_TABS: dict[str, tuple[str, ...]] = {
-    "Controls, rotors and loads": (),
-    "Motion": ("speed", "nacelle", "altitude", "attitude", "position", "course"),
-    "Corridor, protection and air": ("corridor", "protection", "air", "wind", "failures"),
+    "Controls, rotors": ("flapping", "controls", "rotor"),
+    "Loads, power": (),
+    "Attitude, course": ("attitude", "course"),
+    "Speed, place": ("speed", "nacelle", "altitude", "position"),
+    "Corridor, protection": ("corridor", "protection"),
+    "Air, failures": ("air", "wind", "failures"),
     "Loop health": ("loop",),
 }
 """Tabs of the engineer's layout and the groups of signals in each; the first takes those that are nowhere else."""
@@ -94,11 +97,10 @@ def _engineer(*, follow: bool) -> Any:
         ]
         return rrb.Grid(*views, grid_columns=2 if len(views) < 7 else 3, name=name)
 
-    left = rrb.Vertical(rrb.Tabs(_corridor(), _map()), _flight(), _events(), row_shares=[4.0, 3.0, 2.0])
+    told = rrb.Tabs(_events(), _modes(follow=follow), active_tab=0)
+    left = rrb.Vertical(rrb.Tabs(_corridor(), _map()), _flight(), told, row_shares=[4.0, 3.0, 2.2])
     tabs = rrb.Tabs(*(grid(name, names) for name, names in ENGINEER_TABS.items()), active_tab=0)
-    return rrb.Horizontal(
-        left, rrb.Vertical(tabs, _modes(follow=follow), row_shares=[2.2, 1.0]), column_shares=[1.0, 2.2]
-    )
+    return rrb.Horizontal(left, tabs, column_shares=[1.0, 2.2])
 
 
 def _flight(*, cockpit_first: bool = False) -> Any:
