@@ -16,8 +16,8 @@ STEP_S = 1.25
 SHOWN_S = 0.14
 """How long each is shown [s]."""
 SIZE = (800, 450)
-COLOURS = 128
-MOSAIC = 6
+COLOURS = 255
+MOSAIC = 8
 """Pictures that the palette is made from."""
 SETTLES_S = 0.8
 """Time that the viewer is given to draw what it got [s]."""
@@ -50,7 +50,7 @@ def main() -> None:
     mosaic = Image.new("RGB", (SIZE[0], SIZE[1] * MOSAIC))
     for place in range(MOSAIC):
         mosaic.paste(frames[(2 * place + 1) * len(frames) // (2 * MOSAIC)], (0, SIZE[1] * place))
-    palette = mosaic.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    palette = mosaic.quantize(COLOURS, method=Image.Quantize.MEDIANCUT, kmeans=2)
     still = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     durations = [round(1000 * SHOWN_S)] * (len(still) - 1) + [1500]
     still[0].save(

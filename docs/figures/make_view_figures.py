@@ -57,7 +57,7 @@ PICTURES: dict[str, tuple[str, Layout, str]] = {
     },
 }
 """Situation, layout and size of the pictures that the pages show."""
-COMPARED = ("ep21_steep_turn", ("monitor", "full"), 8.0)
+COMPARED = ("ep21_steep_turn", ("monitor", "full"), 7.0)
 """Scenario, two laws whose flights are laid over each other, and the time [s]: ``view_compare``."""
 COLOURS = 256
 LONGEST_SETTLING_S = 25.0
@@ -90,7 +90,7 @@ def viewing(size: str, *source: str) -> Iterator[ViewerClient]:
     port = free_port()
     command = (
         rerun_viewer._binary(), "--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", size,
-        "--memory-limit", "1GiB", *source,
+        "--memory-limit", "4GiB", *source,
     )  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as viewer:
         time.sleep(2.5)
@@ -199,9 +199,8 @@ def keep(shown: Image.Image, target: Path) -> None:
         shown: The picture.
         target: Where to.
     """
-    shown.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG).save(
-        target, optimize=True
-    )
+    palette = shown.quantize(COLOURS, method=Image.Quantize.MEDIANCUT, kmeans=2)
+    shown.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG).save(target, optimize=True)
 
 
 def take_all(folder: Path) -> None:

@@ -66,7 +66,7 @@ def _compare() -> Any:
         plots.append(_time_series(f"difference/{name}", f"B less A [{unit}]", follow=False, legend=False))
     apart = _time_series("difference/apart", "Apart [m]", follow=False, legend=False)
     below = rrb.Horizontal(_corridor(bare=True), rrb.Tabs(apart, _events(), _map(), _modes(follow=False)))
-    left = rrb.Vertical(_flight(), below, row_shares=[1.1, 1.0])
+    left = rrb.Vertical(rrb.Tabs(_chase(away=2.4), _cockpit(), active_tab=0), below, row_shares=[1.1, 1.0])
     side_by_side = rrb.Grid(*plots, grid_columns=2, name="Side by side")
     right = rrb.Tabs(side_by_side, _instruments(), active_tab=0)
     return rrb.Horizontal(left, right, column_shares=[1.25, 1.0])
@@ -108,14 +108,14 @@ def _flight(*, cockpit_first: bool = False) -> Any:
     return rrb.Tabs(_chase(), _cockpit(), active_tab=int(cockpit_first))
 
 
-def _chase() -> Any:
+def _chase(*, away: float = 1.0) -> Any:
+    """From behind the aircraft; farther away where another one is to be seen, too."""
+    eye = tuple(away * way for way in (-19.0, -8.6, -6.6))
     return _eye(
         "world/chase",
         "Chase",
         ["/world/**", "- /world/aircraft/cockpit"],
-        rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=(-19.0, -8.6, -6.6), look_target=(0.6, -0.2, -1.6), eye_up=(0, 0, -1)
-        ),
+        rrb.EyeControls3D(kind=rrb.Eye3DKind.Orbital, position=eye, look_target=(0.6, -0.2, -1.6), eye_up=(0, 0, -1)),
     )
 
 

@@ -80,7 +80,7 @@ def _draw_needle(art: LineArt, row: FloatArray) -> None:
     tip = _on_dial(nacelle, _DIAL_RADIUS - 12.0)
     art.line([_DIAL, tip], WHITE, radius=2.2)
     art.line([_on_dial(nacelle + 90.0, 16.0), _DIAL], WHITE, radius=1.2)
-    across = [_on_dial(nacelle, _DIAL_RADIUS - 16.0) + offset * _direction(nacelle + 90.0) for offset in (-20.0, 20.0)]
+    across = [_on_dial(nacelle, _DIAL_RADIUS - 16.0) + offset * _direction(nacelle + 90.0) for offset in (-15.0, 15.0)]
     art.line(np.array(across), (*TEXT, 190), radius=1.3)
     art.line([_on_dial(reference, _DIAL_RADIUS + 1.0), _on_dial(reference, _DIAL_RADIUS - 9.0)], CYAN, radius=1.4)
 
