@@ -32,8 +32,9 @@ def pictures() -> list[Image.Image]:
     with viewing(SMALL, "--connect", str(streamer.url)) as client:
         step = round(log.metadata.rate_hz * STEP_S)
         for first in range(0, len(log.rows), step):
-            for at in range(first, min(first + step, len(log.rows)), 25):
-                streamer.take(log.rows[at : at + 25])
+            piece = log.rows[first : first + step]
+            for at in range(0, len(piece), 25):
+                streamer.take(piece[at : at + 25])
             while events and events[0].frame < first + step:
                 event = events.pop(0)
                 streamer.event(event.text, event.level)

@@ -188,6 +188,7 @@ def take_comparison(target: Path) -> None:
         recording = Path(folder) / "compared.rrd"
         record_logs(logs, recording, layout="compare")
         with viewing(SMALL, str(recording)) as client:
+            time.sleep(8.0)  # it has read the recording
             client.set_time("sim_time", duration=time_s, play_state="paused")
             keep(settled(client), target)
 
