@@ -57,8 +57,8 @@ PICTURES: dict[str, tuple[str, Layout, str]] = {
     },
 }
 """Situation, layout and size of the pictures that the pages show."""
-COMPARED = ("ep21_steep_turn", ("monitor", "full"), 7.0)
-"""Scenario, two laws whose flights are laid over each other, and the time [s]: ``view_compare``."""
+COMPARED = (("typical_conversion", "conversion_8deg"), 49.0)
+"""Two scenarios that are laid over each other, and the time [s]: ``view_compare``."""
 COLOURS = 256
 LONGEST_SETTLING_S = 25.0
 
@@ -72,7 +72,7 @@ def flown(scenario: str, protection: str) -> FlightLog:
         protection: Law that watches it.
     """
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{protection}.parquet"
+        path = Path(folder) / f"{scenario}.parquet"
         scenarios.fly(
             scenario, speed="max", overrides=Overrides(protection=protection), outputs=FlightOutputs(log=path)
         )
@@ -181,8 +181,8 @@ def take_comparison(target: Path) -> None:
     Args:
         target: Where to.
     """
-    scenario, laws, time_s = COMPARED
-    logs = [flown(scenario, law) for law in laws]
+    names, time_s = COMPARED
+    logs = [flown(name, "monitor") for name in names]
     os.environ.update(rerun_viewer.quiet_environment())
     with tempfile.TemporaryDirectory() as folder:
         recording = Path(folder) / "compared.rrd"

@@ -66,7 +66,7 @@ def _compare() -> Any:
         plots.append(_time_series(f"difference/{name}", f"B less A [{unit}]", follow=False, legend=False))
     apart = _time_series("difference/apart", "Apart [m]", follow=False, legend=False)
     below = rrb.Horizontal(_corridor(bare=True), rrb.Tabs(apart, _events(), _map(), _modes(follow=False)))
-    left = rrb.Vertical(rrb.Tabs(_chase(away=2.4), _cockpit(), active_tab=0), below, row_shares=[1.1, 1.0])
+    left = rrb.Vertical(rrb.Tabs(_chase(away=1.7), _cockpit(), active_tab=0), below, row_shares=[1.1, 1.0])
     side_by_side = rrb.Grid(*plots, grid_columns=2, name="Side by side")
     right = rrb.Tabs(side_by_side, _instruments(), active_tab=0)
     return rrb.Horizontal(left, right, column_shares=[1.25, 1.0])

@@ -84,7 +84,7 @@ class Overlay:
         self._track: list[list[float]] = []
         self._trail_time = -math.inf
         self._ghost = Aircraft(recording, "world/ghost", ghost=GHOST)
-        label = rr.Points3D([[0.0, 0.0, -3.2]], radii=[-1.5], colors=[GHOST], labels=[flights[1].name])
+        label = rr.Points3D([[0.0, 0.0, -7.0]], radii=[-1.5], colors=[GHOST], labels=[flights[1].name])
         recording.log("world/ghost/name", label, static=True)
         for name in COMPARED:
             for letter, flight, colour in zip("ab", flights, (TRAIL, GHOST), strict=True):
