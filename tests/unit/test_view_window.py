@@ -10,9 +10,10 @@ import rerun as rr
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.view import cockpit, instruments, lamps, scene, surroundings
+from telemetry.view import cockpit, instruments, lamps, scene, surroundings, viewer
 from telemetry.view.aircraft import GHOST_OPACITY, Aircraft
 from telemetry.view.colours import ACTING, AMBER, GHOST, LEVELS, RED
+from telemetry.view.options import ViewOptions
 from telemetry.view.strokes import LineArt, text_width
 
 
@@ -187,3 +188,25 @@ def test_lines_given_as_arrays_are_the_lines_that_were_drawn() -> None:
     assert array(lines.colors).tolist() == [0x010203FF, 0x04050607]
     assert array(lines.radii).tolist() == [-1.5, 2.0]
     assert LineArt().archetype(0.0).strips.as_arrow_array().to_pylist() == []
+
+
+@pytest.mark.parametrize(
+    ("source", "end"),
+    [
+        ("rerun+http://127.0.0.1:9/proxy", ["--expect-data-soon", "--connect", "rerun+http://127.0.0.1:9/proxy"]),
+        ("/tmp/flight.rrd", ["/tmp/flight.rrd"]),
+    ],
+)
+def test_the_viewer_is_given_a_flight_or_a_recording(
+    source: str, end: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[list[str]] = []
+    monkeypatch.setattr(viewer, "_binary", lambda: "rerun")
+    monkeypatch.setattr(viewer.subprocess, "run", lambda *_, **__: None)
+    monkeypatch.setattr(viewer.subprocess, "Popen", lambda command, **_: started.append(command))
+    viewer.Viewer(ViewOptions(), source)
+    (command,) = started
+    assert command[: command.index("2GiB") + 1] == [
+        "rerun", "--bind", "127.0.0.1", "--port", "auto", "--memory-limit", "2GiB",
+    ]  # fmt: skip
+    assert command[command.index("2GiB") + 1 :] == end
