@@ -62,7 +62,8 @@ def _compare() -> Any:
     """Two flights: window and corridor on the left; on the right what each did, and the difference beside it."""
     plots = []
     for number, (name, (title, _, unit)) in enumerate(COMPARED.items()):
-        plots.append(_time_series(f"compare/{name}", f"{title} [{unit}]", follow=False, legend=not number))
+        names: dict[str, Any] = {"legend": not number, "corner": "RightBottom"}
+        plots.append(_time_series(f"compare/{name}", f"{title} [{unit}]", follow=False, **names))
         plots.append(_time_series(f"difference/{name}", f"B less A [{unit}]", follow=False, legend=False))
     apart = _time_series("difference/apart", "Apart [m]", follow=False, legend=False)
     below = rrb.Horizontal(_corridor(bare=True), rrb.Tabs(apart, _events(), _map(), _modes(follow=False)))
@@ -188,7 +189,7 @@ def _modes(*, follow: bool) -> Any:
     )
 
 
-def _time_series(path: str, title: str, *, follow: bool, legend: bool = True) -> Any:
+def _time_series(path: str, title: str, *, follow: bool, legend: bool = True, corner: Any = "LeftTop") -> Any:
     """A plot; while the flight goes on, of its last seconds."""
     window = None
     if follow:
@@ -199,7 +200,7 @@ def _time_series(path: str, title: str, *, follow: bool, legend: bool = True) ->
         name=title,
         axis_x=_time_axis(SHOWN_SECONDS) if follow else None,
         time_ranges=window,
-        plot_legend=rrb.PlotLegend(corner="LeftTop", visible=legend),
+        plot_legend=rrb.PlotLegend(corner=corner, visible=legend),
     )
 
 
