@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from telemetry.view.options import ViewOptions
 
 
-Layout = Literal["pilot", "engineer"]
+Layout = Literal["pilot", "cockpit", "engineer"]
 StartName = Literal["hover", "conversion", "cruise"]
 Severity = Literal["none", "light", "moderate", "severe"]
 
@@ -125,7 +125,8 @@ def fly_command(
     layout: Annotated[
         Layout,
         typer.Option(
-            help="Layout of the viewer: instruments large, or plots of every signal.", rich_help_panel="Outputs"
+            help="Layout of the viewer: instruments, from behind or from the seat; or plots of every signal.",
+            rich_help_panel="Outputs",
         ),
     ] = "pilot",
     log: Annotated[

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rtsim.cli.help_text import App
-from rtsim.cli.output import console, emit_json, results, working
+from rtsim.cli.output import console, emit_json, progress, results, working
 from rtsim.whole_file import check_writable
 
 if TYPE_CHECKING:
@@ -45,7 +45,9 @@ def plot_command(
 
     folder = out or log.with_name(f"{log.stem}-plots")
     check_writable(folder, folder=True)
-    files = plot_flight(read_log(log), folder)
+    flight = read_log(log)
+    with progress("Drawing", total=1.0) as advance:
+        files = plot_flight(flight, folder, on_progress=advance)
     if json:
         emit_json({"log": log, "files": files})
         return

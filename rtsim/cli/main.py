@@ -30,7 +30,7 @@ EXIT_INTERRUPTED = 130
 
 COMMAND_MODULES = {
     "Fly": ("fly", "scenarios", "joystick", "flightgear", "timing"),
-    "Look at a flight": ("log", "replay"),
+    "Look at a flight": ("log", "view", "replay"),
     "Look at the aircraft": ("analysis", "rotor", "performance", "corridor", "model", "pilot", "validate"),
     "Test and search": ("check", "test", "campaign", "breaking", "optimize", "reproduce"),
 }

@@ -84,7 +84,13 @@ def around_scenario(where: str, name: str, duration_s: float, bandwidth_hz: floa
         "gusts": [whole],
         "pilot": {"yields": 0.5, "reaction_s": {"uniform": [0.5, 2.0]}},
     }
-    content = {"format": 1, "name": f"around_{name}"[:100], "title": title[:200], "duration_s": duration_s, "classes": [item]}
+    content = {
+        "format": 1,
+        "name": f"around_{name}"[:100],
+        "title": title[:200],
+        "duration_s": duration_s,
+        "classes": [item],
+    }
     return tomli_w.dumps(content)
 
 

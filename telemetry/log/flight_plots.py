@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -91,16 +92,21 @@ _BOTH_ROTORS = (
     _Panel("Torque of each mast", ("mast_torque_right_inlb", "mast_torque_left_inlb")),
 )
 _SIDEWAYS = ("bank_deg", "sideslip_deg", "turn_rate_deg_s")
+_TOLD_OPTIONS = (("pilot", "pilot"), ("protection", "protection"), ("nacelle", "nacelles"))
+"""Options of a flight that stand in the titles, and what they are called there."""
 _NOTICED = 0.05
 """Bank, sideslip and turn rate from which on a flight is drawn as one that moved sideways [deg, deg/s]."""
 
 
-def plot_flight(log: FlightLog, directory: str | os.PathLike[str]) -> list[Path]:
+def plot_flight(
+    log: FlightLog, directory: str | os.PathLike[str], on_progress: Callable[[float, str], None] | None = None
+) -> list[Path]:
     """Draw a flight.
 
     Args:
         log: The flight; what it does not hold (boundaries, timing) is left out.
         directory: Where the pictures go; it is made if needed, pictures of the same name are replaced.
+        on_progress: Called with the share of the work that was done, and what comes next, in words.
 
     Returns:
         The files written, SVG and PNG of each picture.
@@ -117,9 +123,40 @@ def plot_flight(log: FlightLog, directory: str | os.PathLike[str]) -> list[Path]
     except OSError as failure:
         raise OutputError(f"{out}: cannot be made ({failure.strerror}); choose another directory.") from failure
     files: list[Path] = []
-    for name, draw, size in _pictures(log):
+    pictures = _pictures(log)
+    whole, done = sum(_work(size) for _, _, size in pictures), 0.0
+    for name, draw, size in pictures:
+        if on_progress is not None:
+            on_progress(done, f"Drawing {name}")
         files += _write(log, out / name, draw=draw, size=size)
+        done = _work(size) / whole
+    if on_progress is not None:
+        on_progress(done, "Drawn")
     return files
+
+
+def _work(size: tuple[float, float]) -> float:
+    """What a picture of a size takes, about: its axes are as many as there is room for."""
+    return size[0] * size[1]
+
+
+def flight_title(log: FlightLog) -> tuple[str, str]:
+    """What was flown, and by whom with what: a line to be read, and one to tell flights apart.
+
+    Args:
+        log: The flight.
+    """
+    metadata = log.metadata
+    try:
+        told = tomllib.loads(metadata.scenario_toml).get("title")
+    except tomllib.TOMLDecodeError:
+        told = None
+    flown = metadata.setup.get("flight")
+    options = flown.get("options") if isinstance(flown, dict) else None
+    chosen = options if isinstance(options, dict) else {}
+    words = [f"{word} {chosen[key]}" for key, word in _TOLD_OPTIONS if isinstance(chosen.get(key), str)]
+    below = [metadata.scenario_name, *words, f"seed {metadata.seed}", log.path.name]
+    return (told if isinstance(told, str) and told else metadata.scenario_name), "   ".join(below)
 
 
 def _pictures(log: FlightLog) -> list[_Picture]:
@@ -163,15 +200,23 @@ def _write(
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         draw(log, figure)
-        figure.suptitle(f"{log.metadata.scenario_name} ({log.path.name})", fontsize=11)
+        title, below = flight_title(log)
+        figure.suptitle(_shortened(title, round(10 * size[0])), fontsize=11)
+        figure.supxlabel(_shortened(below, round(14 * size[0])), fontsize=7.5, color="#555555")
+        if (engine := figure.get_layout_engine()) is not None:
+            engine.execute(figure)
+            figure.set_layout_engine(None)  # laid out once: with an engine every file is drawn twice
         for ending in FORMATS:
             path = target.with_suffix(f".{ending}")
             # Without its date the same flight gives the same file.
             options: dict[str, Any] = {"metadata": {"Date": None}} if ending == "svg" else {"dpi": 130}
             with whole_file(path) as temporary:
                 figure.savefig(temporary, **options)
-            figure.set_layout_engine("none")  # what was laid out stays: it takes longer than drawing
             yield path
+
+
+def _shortened(line: str, letters: int) -> str:
+    return line if len(line) <= letters else f"{line[: letters - 3].rstrip()}..."
 
 
 def _thin(values: FloatArray) -> FloatArray:
@@ -314,9 +359,12 @@ def _mark_times(axes: Axes, log: FlightLog) -> None:
 
 def _draw_margins(log: FlightLog, figure: Figure) -> None:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[2.0, 1.0])
+    upper.plot(
+        _thin(log["time_s"]), _thin(log["margin_kt"]), color="#8a94a3", linewidth=6.0, alpha=0.35,
+        solid_capstyle="butt", label="margin, the smaller of both",
+    )  # fmt: skip
     _curve(upper, log, "margin_low_kt", colour=_LOW)
     _curve(upper, log, "margin_high_kt", colour=_HIGH)
-    _curve(upper, log, "margin_kt", colour="#222222", dashed=True)
     floor = min(0.0, float(log["margin_kt"].min())) - 3.0
     for low, high, colour in _LEVELS:
         upper.axhspan(max(low, floor), high, color=colour, alpha=0.18, linewidth=0)
@@ -332,6 +380,8 @@ def _draw_margins(log: FlightLog, figure: Figure) -> None:
 
 def _draw_all_signals(log: FlightLog, figure: Figure) -> None:
     """One plot for every group and unit, so that nothing recorded goes unseen."""
+    figure.set_layout_engine(None)  # laying out so many axes takes longer than drawing them
+    figure.subplots_adjust(left=0.06, right=0.985, top=0.955, bottom=0.045, hspace=0.45, wspace=0.2)
     groups = [group for group in plot_groups() if not group.path.startswith("plots/loop")]
     grid = figure.subplots(-(-len(groups) // 3), 3, sharex=True).ravel()
     for axes, group in zip(grid, groups, strict=False):

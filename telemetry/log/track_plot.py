@@ -96,8 +96,9 @@ def marked(
         path: Both coordinates of the path.
         near: Distance in each coordinate within which marks cover one another.
     """
+    step = mark_step(float(time[-1] - time[0]))
     places: list[tuple[int, list[float]]] = []
-    for mark in np.arange(time[0], time[-1] + 1e-9, mark_step(float(time[-1] - time[0]))):
+    for mark in np.arange(time[0], time[-1] + 1e-9, step):
         index = min(int(np.searchsorted(time, mark)), len(time) - 1)
         covered = [
             marks
@@ -109,7 +110,14 @@ def marked(
         else:
             places.append((index, [float(mark)]))
     for index, marks in places:
-        yield index, f"{marks[0]:.0f} s" if len(marks) == 1 else f"{marks[0]:.0f} to {marks[-1]:.0f} s"
+        yield index, _in_words(marks, step)
+
+
+def _in_words(marks: list[float], step: float) -> str:
+    """Times at one place: "5 s", "5 to 20 s" where it was kept, "5, 40 to 60 s" where the path came back to it."""
+    ends = np.flatnonzero(np.diff(marks) > 1.5 * step) + 1
+    stays = [f"{stay[0]:.0f}" + (f" to {stay[-1]:.0f}" if len(stay) > 1 else "") for stay in np.split(marks, ends)]
+    return f"{', '.join(stays)} s"
 
 
 def mark_step(duration_s: float) -> float:

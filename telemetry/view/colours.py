@@ -22,7 +22,10 @@ ACTING = (232, 121, 249)
 WIND = (178, 206, 255)
 """Where the air goes."""
 TRAIL = (96, 165, 250)
-LEFT_ROTOR, RIGHT_ROTOR = (255, 110, 100), (96, 165, 250)
+GHOST = (244, 114, 182)
+"""A second flight over the one that is shown."""
+LEFT_ROTOR, RIGHT_ROTOR = (206, 212, 220), (96, 165, 250)
+"""No colour of an alarm."""
 SKY, GROUND = (44, 104, 178), (108, 76, 44)
 """Of the attitude ball."""
 SERIES = (

@@ -15,7 +15,7 @@ from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
 from telemetry.log.corridor_outline import CorridorOutline
 from telemetry.view.colours import CYAN, DIM, FRAME, GRID, HIGH_SIDE, LEVELS, LOW_SIDE, TEXT, TRAIL, WHITE
-from telemetry.view.strokes import Colour, LineArt
+from telemetry.view.strokes import Align, Colour, LineArt, text_width
 
 UNITS_PER_DEGREE = 2.7
 """Vertical scale."""
@@ -23,12 +23,14 @@ SLOWEST_KT, FASTEST_KT = -40.0, 200.0
 """Airspeeds at the left and right edge."""
 HIGHEST_DEG = 95.0
 """Nacelle angle at the upper edge."""
-BOUNDS = ((-74.0, 214.0), (-16.0, 286.0))
+BOUNDS = ((-72.0, 212.0), (-20.0, 292.0))
 """What the view shows: x range, y range."""
 TURN_STEP = 0.04
 """Steps of load factor in which the sides of a turn are drawn: 2 kn at most."""
 TRAIL_POINTS = 400
 """Longest trail, in points half a second apart."""
+
+_MARGIN_HEIGHT = 14.0
 
 
 def height_of(nacelle_deg: float) -> float:
@@ -76,9 +78,9 @@ class CorridorPlot:
         point_x, point_y = min(max(speed, SLOWEST_KT), FASTEST_KT), height_of(nacelle)
         colour = LEVELS[level_of(row)]
         target = [float(row[COLUMN.airspeed_reference_kt]), height_of(float(row[COLUMN.nacelle_reference_deg]))]
-        art.line(_circle(target, 4.2), CYAN, radius=-1.0)
-        art.line(_circle([point_x, point_y], 1.4), colour, radius=1.5)
-        art.line(_circle([point_x, point_y], 3.4), WHITE, radius=-1.0)
+        art.line(_circle(target, 6.5), CYAN, radius=-1.2)
+        art.line(_circle([point_x, point_y], 2.0), colour, radius=2.2)
+        art.line(_circle([point_x, point_y], 5.0), WHITE, radius=-1.2)
         self._recording.log("corridor/now", art.archetype(3.0))
         time_s = float(row[COLUMN.time_s])
         if time_s - self._trail_time >= 0.5:
@@ -114,11 +116,13 @@ class CorridorPlot:
             end = min(max(speed + direction * margin, SLOWEST_KT), FASTEST_KT)
             art.line([[speed, y], [end, y]], colour, radius=-1.2)
             art.line([[end, y - 3.0], [end, y + 3.0]], colour, radius=-1.4)
-            above = y - 9.0 if y > 24.0 else y + 10.0
+            above = y - 13.0 if y > 30.0 else y + 14.0
+            words = f"{margin:+.0f}"
+            half = 0.5 * text_width(words, _MARGIN_HEIGHT) + 5.0
             # Between point and boundary if there is room, else beyond the boundary.
-            away = margin + 16.0 if 0.0 <= margin < 36.0 else 17.0
+            away = margin + half if 0.0 <= margin < 2.0 * half else half
             art.text(
-                f"{margin:+.0f}", speed + direction * away, above, height=8.0, colour=colour, align="centre", weight=1.2
+                words, speed + direction * away, above, height=_MARGIN_HEIGHT, colour=colour, align="centre", weight=1.2
             )
 
 
@@ -139,14 +143,14 @@ def _draw_axes(art: LineArt) -> None:
         strong = speed == 0.0
         art.line([[speed, top], [speed, bottom]], FRAME if strong else GRID, radius=-0.8 if strong else -0.4)
         if speed % 40.0 == 0.0:
-            art.text(f"{speed:.0f}", speed, bottom + 8.0, height=6.5, colour=DIM, align="centre")
+            art.text(f"{speed:.0f}", speed, bottom + 10.0, height=9.0, colour=DIM, align="centre")
     for angle in (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0):
         y = height_of(angle)
         art.line([[SLOWEST_KT, y], [FASTEST_KT, y]], GRID, radius=-0.4)
-        art.text(f"{angle:.0f}", SLOWEST_KT - 4.0, y, height=6.5, colour=DIM, align="right")
+        art.text(f"{angle:.0f}", SLOWEST_KT - 5.0, y, height=9.0, colour=DIM, align="right")
     art.box(SLOWEST_KT, top, FASTEST_KT, bottom, colour=FRAME, radius=-0.8)
-    art.text("airspeed kn", FASTEST_KT, bottom + 20.0, height=6.5, colour=TEXT, align="right")
-    art.text("nacelle\N{DEGREE SIGN}", SLOWEST_KT - 30.0, top - 7.0, height=6.5, colour=TEXT)
+    art.text("airspeed kn", FASTEST_KT, bottom + 25.0, height=9.0, colour=TEXT, align="right")
+    art.text("nacelle\N{DEGREE SIGN}", SLOWEST_KT - 30.0, top - 11.0, height=9.0, colour=TEXT)
 
 
 def _fill_inside(art: LineArt, outline: CorridorOutline) -> None:
@@ -167,18 +171,17 @@ def _draw_boundaries(art: LineArt, outline: CorridorOutline) -> None:
         for start in range(len(centre) - 1):
             _dash(art, centre[start], centre[start + 1])
     for nacelles, speeds, colour, words in (
-        (outline.low_nacelle_deg, outline.low_kt, LOW_SIDE, "low side"),
-        (outline.high_nacelle_deg, outline.high_kt, HIGH_SIDE, "high side"),
+        (outline.low_nacelle_deg, outline.low_kt, LOW_SIDE, "too slow"),
+        (outline.high_nacelle_deg, outline.high_kt, HIGH_SIDE, "fast"),
     ):
         line = _place(nacelles, speeds)
         art.line(line, colour, radius=-2.0)
         order = np.argsort(nacelles)
         place = float(np.interp(14.0, np.array(nacelles)[order], np.array(speeds)[order]))
-        align = "right" if colour == LOW_SIDE else "left"
-        shift = -6.0 if colour == LOW_SIDE else 3.0
-        height = 6.5 if colour == LOW_SIDE else 5.0
-        text = words if colour == LOW_SIDE else "high"
-        art.text(text, place + shift, height_of(14.0), height=height, colour=colour, align=align)  # type: ignore[arg-type]
+        align: Align = "right" if colour == LOW_SIDE else "left"
+        shift = -6.0 if colour == LOW_SIDE else 4.0
+        height = 10.0 if colour == LOW_SIDE else 7.0
+        art.text(words, place + shift, height_of(14.0), height=height, colour=colour, align=align)
 
 
 def _place(nacelles: tuple[float, ...], speeds: tuple[float, ...]) -> FloatArray:

@@ -15,16 +15,14 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
 from telemetry.view.colours import ACTING, AMBER, CYAN, DIM, FRAME, GREEN, LEFT_ROTOR, RED, RIGHT_ROTOR, TEXT, WHITE
+from telemetry.view.lamps import FLAPPING_HIGH, TORQUE_HIGH
 from telemetry.view.strokes import LineArt
 
 _RIGHT = 156.0
-_DIAL = (-136.0, 227.0)
+_TOP, _LAST = 179.0, 266.0
+_DIAL = (-136.0, 267.0)
 _DIAL_RADIUS = 76.0
-_FLAPPING_HIGH = 6.0
-"""Flapping that is told in amber [deg]."""
-_TORQUE_HIGH = 130_000.0
-"""Rated mast torque [in lb]."""
-_SIDES_SHOWN = (("flapping", _FLAPPING_HIGH, 12.0), ("torque in lb", _TORQUE_HIGH, 180_000.0))
+_SIDES_SHOWN = (("flapping", FLAPPING_HIGH, 12.0), ("torque in lb", TORQUE_HIGH, 180_000.0))
 """What is shown of both rotors: name, where its amber mark is, full scale."""
 _SIDES_LEFT, _SIDES_STEP, _SIDES_BELOW = 28.0, 44.0, (12.5, 19.5)
 _CONTROLS = (
@@ -44,14 +42,14 @@ def draw_faces(art: LineArt) -> None:
     """What does not move."""
     _draw_dial_face(art)
     for index, (name, limit, full) in enumerate(_SIDES_SHOWN):
-        y = 138.0 + _SIDES_STEP * index
+        y = _TOP + _SIDES_STEP * index
         art.text(name, 20.0, y, height=6.5, colour=DIM)
         for letter, below in zip("LR", _SIDES_BELOW, strict=True):
             art.text(letter, 20.0, y + below, height=5.0, colour=DIM)
         x = _SIDES_LEFT + (_RIGHT - _SIDES_LEFT) * limit / full
         art.line([[x, y + 9.5], [x, y + 22.5]], AMBER, radius=-1.0)
-    art.text("shp", 20.0, 226.0, height=6.5, colour=DIM)
-    art.text("load", 84.0, 226.0, height=6.5, colour=DIM)
+    art.text("shp", 20.0, _LAST, height=6.5, colour=DIM)
+    art.text("load", 84.0, _LAST, height=6.5, colour=DIM)
 
 
 def draw_moving(art: LineArt, row: FloatArray) -> None:
@@ -74,7 +72,7 @@ def _draw_dial_face(art: LineArt) -> None:
             art.text(str(angle), x, y, height=6.5, colour=DIM, align="centre")
     for detent in (75.0, 50.0):
         art.line([_on_dial(detent, _DIAL_RADIUS + 1.0), _on_dial(detent, _DIAL_RADIUS + 6.0)], AMBER, radius=-1.6)
-    art.text("nacelle", 6.0, 138.0, height=6.5, colour=DIM, align="right")
+    art.text("nacelle", 6.0, _TOP, height=6.5, colour=DIM, align="right")
 
 
 def _draw_needle(art: LineArt, row: FloatArray) -> None:
@@ -82,7 +80,7 @@ def _draw_needle(art: LineArt, row: FloatArray) -> None:
     tip = _on_dial(nacelle, _DIAL_RADIUS - 12.0)
     art.line([_DIAL, tip], WHITE, radius=2.2)
     art.line([_on_dial(nacelle + 90.0, 16.0), _DIAL], WHITE, radius=1.2)
-    across = [_on_dial(nacelle, _DIAL_RADIUS - 16.0) + offset * _direction(nacelle + 90.0) for offset in (-20.0, 20.0)]
+    across = [_on_dial(nacelle, _DIAL_RADIUS - 16.0) + offset * _direction(nacelle + 90.0) for offset in (-15.0, 15.0)]
     art.line(np.array(across), (*TEXT, 190), radius=1.3)
     art.line([_on_dial(reference, _DIAL_RADIUS + 1.0), _on_dial(reference, _DIAL_RADIUS - 9.0)], CYAN, radius=1.4)
 
@@ -90,19 +88,19 @@ def _draw_needle(art: LineArt, row: FloatArray) -> None:
 def draw_numerals(art: LineArt, row: FloatArray) -> None:
     """Nacelle angle and reference, the larger of both rotors' flapping and torque, power, load factor."""
     nacelle, reference = float(row[COLUMN.nacelle_deg]), float(row[COLUMN.nacelle_reference_deg])
-    art.text(f"{nacelle:.1f}\N{DEGREE SIGN}", 8.0, 153.0, height=13.0, colour=WHITE, align="right", weight=1.25)
-    art.text(f"ref {reference:.1f}\N{DEGREE SIGN}", 7.0, 169.0, height=6.5, colour=CYAN, align="right")
+    art.text(f"{nacelle:.1f}\N{DEGREE SIGN}", 8.0, _TOP + 15.0, height=13.0, colour=WHITE, align="right", weight=1.25)
+    art.text(f"ref {reference:.1f}\N{DEGREE SIGN}", 7.0, _TOP + 31.0, height=6.5, colour=CYAN, align="right")
     flapping = max(float(row[COLUMN.flapping_left_deg]), float(row[COLUMN.flapping_right_deg]))
     torque = max(float(row[COLUMN.mast_torque_left_inlb]), float(row[COLUMN.mast_torque_right_inlb]))
     short = row[COLUMN.engine_power_shp] > row[COLUMN.engine_power_available_shp]
     for y, value, colour in (
-        (138.0, f"{flapping:.1f}\N{DEGREE SIGN}", AMBER if flapping > _FLAPPING_HIGH else WHITE),
-        (138.0 + _SIDES_STEP, f"{torque / 1000.0:.0f} k", AMBER if torque > _TORQUE_HIGH else WHITE),
+        (_TOP, f"{flapping:.1f}\N{DEGREE SIGN}", AMBER if flapping > FLAPPING_HIGH else WHITE),
+        (_TOP + _SIDES_STEP, f"{torque / 1000.0:.0f} k", AMBER if torque > TORQUE_HIGH else WHITE),
     ):
         art.text(value, _RIGHT, y, height=11.0, colour=colour, align="right", weight=1.15)
     power, load = f"{row[COLUMN.power_shp]:.0f}", f"{row[COLUMN.load_factor]:.2f}"
     for right, value, colour in ((75.0, power, AMBER if short else WHITE), (_RIGHT, load, WHITE)):
-        art.text(value, right, 226.0, height=9.0, colour=colour, align="right", weight=1.15)
+        art.text(value, right, _LAST, height=9.0, colour=colour, align="right", weight=1.15)
 
 
 def _draw_sides(art: LineArt, row: FloatArray) -> None:
@@ -113,7 +111,7 @@ def _draw_sides(art: LineArt, row: FloatArray) -> None:
             (row[COLUMN.mast_torque_left_inlb], row[COLUMN.mast_torque_right_inlb]),
         )
     ):
-        full, top = _SIDES_SHOWN[index][2], 138.0 + _SIDES_STEP * index
+        full, top = _SIDES_SHOWN[index][2], _TOP + _SIDES_STEP * index
         for value, below, colour in zip((left, right), _SIDES_BELOW, (LEFT_ROTOR, RIGHT_ROTOR), strict=True):
             end = _SIDES_LEFT + (_RIGHT - _SIDES_LEFT) * min(max(float(value) / full, 0.0), 1.0)
             art.line([[_SIDES_LEFT, top + below], [end, top + below]], colour, radius=1.6)
@@ -121,7 +119,7 @@ def _draw_sides(art: LineArt, row: FloatArray) -> None:
 
 def _draw_controls(art: LineArt, row: FloatArray) -> None:
     """Every control between its stops; what the hands ask for where protection gives something else."""
-    for left, y, (name, low, places) in zip((-80.0, -80.0, 86.0, 86.0), (248.0, 266.0) * 2, _CONTROLS, strict=True):
+    for left, y, (name, low, places) in zip((-80.0, -80.0, 86.0, 86.0), (288.0, 305.0) * 2, _CONTROLS, strict=True):
         value, asked, reason = (float(row[place]) for place in places)
         right = left + 70.0
         words = f"{name} prot" if reason else name

@@ -13,7 +13,7 @@ import rerun as rr
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN
-from telemetry.view import gauges
+from telemetry.view import gauges, lamps
 from telemetry.view.colours import (
     AMBER,
     BACKGROUND,
@@ -33,10 +33,12 @@ from telemetry.view.colours import (
 from telemetry.view.corridor import level_of
 from telemetry.view.strokes import LineArt
 
-BOUNDS = ((-160.0, 160.0), (-101.0, 278.0))
+BOUNDS = ((-160.0, 160.0), (-100.0, 316.0))
 """What the view shows: x range, y range."""
-LEVEL_WORDS = ("CORRIDOR CLEAR", "CORRIDOR CAUTION", "CORRIDOR WARNING", "OUTSIDE CORRIDOR")
+LEVEL_WORDS = ("CORRIDOR CLEAR", "CAUTION", "WARNING", "OUTSIDE")
 """What the band under the ball says at each level."""
+SIDE_WORDS = ("TOO SLOW", "TOO FAST")
+"""What it adds where the aircraft is near the low or the high side."""
 
 PICTURES_PER_TEXT = 3
 """Numerals change only in every third picture: faster could not be read, and they are most of the data."""
@@ -111,6 +113,7 @@ class Instruments:
             text = LineArt()
             _draw_windows(text, row)
             _draw_annunciator(text, row)
+            lamps.draw(text, row)
             gauges.draw_numerals(text, row)
             self._recording.log("instruments/text", text.archetype(7.0))
         self._updates += 1
@@ -211,8 +214,9 @@ def _faces() -> LineArt:
     art.line([[-1.0, 0.0], [1.0, 0.0]], BACKGROUND, radius=3.6)
     art.line([[-0.5, 0.0], [0.5, 0.0]], AMBER, radius=2.4)
     for side in (-1.0, 1.0):
-        near, far = side * (_BALL_EDGE + 6.0), side * (_TAPE_EDGE - 6.0)
-        art.bar(min(near, far), _TOP + 2.0, max(near, far), _TOP + 15.0, colour=PANEL)
+        near, far = side * (_BALL_EDGE + 5.0), side * (_TAPE_EDGE - 2.0)
+        for y in np.arange(_TOP + 2.0, _TOP + 15.0, 2.0):  # what is thin has nearly square ends
+            art.line([[near, y], [far, y]], PANEL, radius=1.6)
     art.text("kn", -_TAPE_EDGE + 5.0, _TOP + 9.0, height=6.0, colour=DIM)
     art.text("alt m", _TAPE_EDGE - 5.0, _TOP + 9.0, height=6.0, colour=DIM, align="right")
     for degrees, length in _BANK_MARKS:
@@ -226,6 +230,7 @@ def _faces() -> LineArt:
         x = side * _STANDARD_RATE * _TREND_S * _HEADING_SCALE
         art.line([[x, _BALL_BOTTOM], [x, _BALL_BOTTOM + 5.5]], WHITE, radius=-1.1)
     gauges.draw_faces(art)
+    lamps.draw_faces(art)
     return art
 
 
@@ -249,8 +254,8 @@ def _draw_speed_limits(art: LineArt, row: FloatArray) -> None:
 def _draw_windows(art: LineArt, row: FloatArray) -> None:
     """Large airspeed and altitude in the middle of their tapes, rates below."""
     for side, text, rate in (
-        (-1.0, f"{np.round(row[COLUMN.airspeed_kt]) + 0.0:.0f}", f"{row[COLUMN.airspeed_rate_kt_s]:+.1f} kn/s"),
-        (1.0, f"{row[COLUMN.altitude_m]:.1f}", f"{row[COLUMN.climb_rate_m_s]:+.1f} m/s"),
+        (-1.0, f"{np.round(row[COLUMN.airspeed_kt]) + 0.0:.0f}", f"{_tenth(row[COLUMN.airspeed_rate_kt_s]):+.1f} kn/s"),
+        (1.0, f"{row[COLUMN.altitude_m]:.1f}", f"{_tenth(row[COLUMN.climb_rate_m_s]):+.1f} m/s"),
     ):
         near, far = side * (_BALL_EDGE + 10.0), side * _TAPE_EDGE
         left, right = min(near, far), max(near, far)
@@ -265,13 +270,18 @@ def _draw_windows(art: LineArt, row: FloatArray) -> None:
     tilted = f"  bank {abs(bank):.0f} {'R' if bank > 0.0 else 'L'}" if abs(bank) >= 0.5 else ""
     half = 58.0 if tilted else 34.0
     art.bar(-half, _TOP + 3.0, half, _TOP + 15.0, colour=BACKGROUND)
-    words = f"pitch {row[COLUMN.pitch_deg]:+.1f}{tilted}"
+    words = f"pitch {_tenth(row[COLUMN.pitch_deg]):+.1f}{tilted}"
     art.text(words, 0.0, _TOP + 9.0, height=6.0, colour=WHITE, align="centre")
     middle = 0.5 * (_BALL_BOTTOM + _BOTTOM) + 0.5
     art.line([[-11.0, middle], [11.0, middle]], BACKGROUND, radius=8.5)
     art.box(-19.0, middle - 9.0, 19.0, middle + 9.0, colour=WHITE)
     heading = f"{np.round(row[COLUMN.heading_deg]) % 360.0:03.0f}"
     art.text(heading, 0.0, middle, height=11.0, colour=WHITE, align="centre", weight=1.25)
+
+
+def _tenth(value: float) -> float:
+    """A value as it is written, without the minus of what is nothing."""
+    return float(np.round(value, 1)) + 0.0
 
 
 def _draw_bank_and_slip(art: LineArt, row: FloatArray) -> None:
@@ -303,11 +313,18 @@ def _draw_course(art: LineArt, row: FloatArray) -> None:
 
 
 def _draw_annunciator(art: LineArt, row: FloatArray) -> None:
+    """The corridor in words: quiet while clear, framed at a caution, filled at a warning and beyond."""
     level = level_of(row)
-    colour = LEVELS[level]
-    art.box(-_TAPE_EDGE, _BOTTOM + 4.0, _TAPE_EDGE, _BOTTOM + 22.0, colour=colour, radius=-1.6)
-    words = f"{LEVEL_WORDS[level]}  margin {row[COLUMN.margin_kt]:+.0f} kn"
-    art.text(words, 0.0, _BOTTOM + 13.0, height=9.5, colour=colour, align="centre", weight=1.2)
+    colour, top, bottom = LEVELS[level], _BOTTOM + 5.0, _BOTTOM + 25.0
+    side = SIDE_WORDS[int(row[COLUMN.margin_high_kt] < row[COLUMN.margin_low_kt])] if level else ""
+    words = "  ".join(word for word in (LEVEL_WORDS[level], side, f"{row[COLUMN.margin_kt]:+.0f} kn") if word)
+    filled = level > 1
+    if filled:
+        art.bar(-_TAPE_EDGE + 10.0, top, _TAPE_EDGE - 10.0, bottom, colour=colour)
+    elif level:
+        art.box(-_TAPE_EDGE, top, _TAPE_EDGE, bottom, colour=colour, radius=-1.6)
+    height, ink = (12.5, BACKGROUND if filled else colour) if level else (9.0, colour)
+    art.text(words, 0.0, 0.5 * (top + bottom), height=height, colour=ink, align="centre", weight=1.25)
 
 
 def _on_arc(angle_deg: float, radius: float) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-Layout = Literal["pilot", "engineer", "replay"]
+Layout = Literal["pilot", "cockpit", "engineer", "compare"]
 """Layouts with which the viewer opens."""
 
 
@@ -22,6 +22,8 @@ class ViewOptions:
     """Recording to write (``.rrd``), or none."""
     layout: Layout = "pilot"
     """Layout of the viewer."""
+    replay: bool = False
+    """Play what has been flown from its start, instead of following the flight."""
     pictures_per_second: float = 30.0
     """How often pose and instruments are drawn [Hz]."""
     plot_rate_hz: float = 50.0

@@ -133,13 +133,10 @@ class Plots:
         self._recording.log("events/log", rr.TextLog(text, level=EVENT_LEVELS.get(level, "INFO")))
 
     def _log_states(self, row: FloatArray) -> None:
-        converting = int(row[COLUMN.nacelle_deg] < HELICOPTER_FROM_DEG)
-        mode = MODE_NAMES[2] if row[COLUMN.on_downstop] else MODE_NAMES[converting]
-        pilot = int(row[COLUMN.pilot_mode])
         now = {
-            "mode": mode,
+            "mode": MODE_NAMES[mode_of(row)],
             "corridor": LEVEL_NAMES[level_of(row)],
-            "pilot": PILOT_NAMES[pilot] if 0 <= pilot < len(PILOT_NAMES) else PILOT_NAMES[1],
+            "pilot": PILOT_NAMES[pilot_of(row)],
             "protection": ACTING_NAMES[acting_on(row)],
         }
         for name, state in now.items():
@@ -152,6 +149,17 @@ class Plots:
             if name == "mode" and before is not None:
                 # The other two are events of the flight itself, which tells them with its own words.
                 self.event(f"Mode: {state.lower()}", "info")
+
+
+def mode_of(row: FloatArray) -> int:
+    """How the aircraft is configured, by number in ``MODE_NAMES``."""
+    return 2 if row[COLUMN.on_downstop] else int(row[COLUMN.nacelle_deg] < HELICOPTER_FROM_DEG)
+
+
+def pilot_of(row: FloatArray) -> int:
+    """Who flies, by number in ``PILOT_NAMES``."""
+    pilot = row[COLUMN.pilot_mode]
+    return int(pilot) if 0.0 <= pilot < len(PILOT_NAMES) else 1
 
 
 def acting_on(row: FloatArray) -> int:

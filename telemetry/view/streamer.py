@@ -87,6 +87,11 @@ class Streamer:
         """Where a viewer connects."""
         return None if self._port is None else f"rerun+http://127.0.0.1:{self._port}/proxy"
 
+    @property
+    def recording(self) -> Any:
+        """The ``rerun.RecordingStream`` of the present run."""
+        return self._recording
+
     def take(self, rows: FloatArray) -> None:
         """Show new rows.
 
@@ -123,6 +128,11 @@ class Streamer:
         if self._last_time == -math.inf:
             self._recording.set_time("sim_time", duration=0.0)
         self._plots.event(text, level)
+
+    def flush(self) -> None:
+        """Send everything that was taken."""
+        self._send_plots()
+        self._recording.flush(timeout_sec=10.0)
 
     def close(self, *, linger_s: float = 0.0) -> list[Path]:
         """Send what is left and finish the files.
@@ -177,7 +187,7 @@ class Streamer:
         self._instruments = Instruments(recording)
         self._map = GroundMap(recording)
         self._plots = Plots(recording)
-        recording.send_blueprint(blueprint(self._options.layout))
+        recording.send_blueprint(blueprint(self._options.layout, replay=self._options.replay))
         # What is seen until the first row comes, which overwrites it: a helicopter at rest.
         waiting = np.zeros(SIGNAL_COUNT)
         waiting[COLUMN.nacelle_deg], waiting[COLUMN.altitude_m] = 90.0, 100.0

@@ -18,29 +18,27 @@ _temporary: list[Path] = []
 class Viewer:
     """A viewer window, in a session of its own, so that Ctrl-C in the terminal does not close it."""
 
-    def __init__(self, options: ViewOptions, url: str) -> None:
+    def __init__(self, options: ViewOptions, source: str) -> None:
         """Start it.
 
         Args:
             options: Memory limit and command.
-            url: Where the flight is to be had.
+            source: Where the flight is to be had: a URL, or the path of a recording.
 
         Raises:
             OSError: There is no viewer to start.
         """
         environment = {**quiet_environment(), "RERUN_APP_ONLY": "true"}  # as the SDK does for its own viewers
         if options.viewer_command is not None:
-            command = [*options.viewer_command, url]
+            command = [*options.viewer_command, source]
         else:
             binary = _binary()
             # The configuration directory is rtsim's own: the user's choice for other uses of Rerun stays untouched.
             subprocess.run(
                 [binary, "analytics", "disable"], env=environment, timeout=10, capture_output=True, check=False
             )
-            command = [
-                binary, "--bind", "127.0.0.1", "--port", "auto", "--memory-limit", options.memory_limit,
-                "--expect-data-soon", "--connect", url,
-            ]  # fmt: skip
+            way = ["--expect-data-soon", "--connect", source] if "://" in source else [source]
+            command = [binary, "--bind", "127.0.0.1", "--port", "auto", "--memory-limit", options.memory_limit, *way]
         self._process = subprocess.Popen(
             command,
             env=environment,

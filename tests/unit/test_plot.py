@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -169,6 +170,44 @@ def test_marks_that_would_cover_one_another_become_one(tmp_path: Path) -> None:
     flight_plots._draw_corridor(log, figure)
     told = [text.get_text() for text in figure.axes[0].texts]
     assert told == ["0 s", "1 s", "2 s", "3 s", "4 to 7 s"]
+
+
+def test_a_path_out_and_back_keeps_both_times_apart() -> None:
+    time = np.arange(0.0, 40.01, 0.1)
+    way = np.concatenate([np.linspace(0.0, 200.0, 201), np.linspace(199.0, 0.0, 200)])
+    marks = [words for _, words in track_plot.marked(time, (way, way), (5.0, 5.0))]
+    assert marks == ["0, 40 s", "5, 35 s", "10, 30 s", "15, 25 s", "20 s"]
+    assert track_plot._in_words([0.0, 5.0, 10.0, 30.0, 35.0], 5.0) == "0 to 10, 30 to 35 s"
+
+
+def test_the_title_says_what_was_flown_by_whom_with_what(tmp_path: Path) -> None:
+    log = record(tmp_path / "flight.parquet", 60, timed=False)
+    assert flight_plots.flight_title(log) == ("hover <& more>", "hover <& more>   seed 0   flight.parquet")
+    setup = {"flight": {"options": {"pilot": "mocm", "protection": "full", "corridor": None}}}
+    told = replace(log, metadata=replace(log.metadata, scenario_toml='title = "A hover"', setup=setup, seed=7))
+    title, below = flight_plots.flight_title(told)
+    assert title == "A hover"
+    assert below == "hover <& more>   pilot mocm   protection full   seed 7   flight.parquet"
+    damaged = replace(log, metadata=replace(log.metadata, scenario_toml="title =", setup={"flight": 3}))
+    assert flight_plots.flight_title(damaged)[0] == "hover <& more>"
+
+
+def test_the_margin_hides_neither_side(tmp_path: Path) -> None:
+    figure = Figure()
+    flight_plots._draw_margins(record(tmp_path / "flight.parquet", 60, timed=False), figure)
+    wide, *sides = figure.axes[0].get_lines()
+    assert [line.get_label() for line in sides] == ["margin low", "margin high"], "drawn after it, so above it"
+    assert wide.get_alpha() < 0.5
+    assert wide.get_linewidth() > 2.0 * sides[0].get_linewidth()
+
+
+def test_drawing_tells_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    log = record(tmp_path / "flight.parquet", 60, timed=False)
+    monkeypatch.setattr(flight_plots, "_write", lambda *_, **__: [])
+    told: list[tuple[float, str]] = []
+    plot_flight(log, tmp_path / "out", on_progress=lambda share, words: told.append((share, words)))
+    assert sum(share for share, _ in told) == pytest.approx(1.0)
+    assert [words for _, words in told][:2] == ["Drawing corridor", "Drawing flight"]
 
 
 def test_an_unpaced_flight_has_no_timing_picture(tmp_path: Path) -> None:

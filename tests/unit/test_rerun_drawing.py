@@ -12,6 +12,8 @@ from telemetry.log.signal_groups import FLAGS, label, plot_groups
 from telemetry.view import airframe, undercarriage
 from telemetry.view import corridor as rerun_corridor
 from telemetry.view.blueprint import blueprint
+from telemetry.view.options import Layout
+from telemetry.view.overlay import COMPARED
 from telemetry.view.plots import ACTING_NAMES, PILOT_PLOTS, acting_on
 from telemetry.view.strokes import LineArt, text_width
 
@@ -90,16 +92,19 @@ def test_text_is_aligned(align: str, left: float) -> None:
     assert points[:, 0].min() == pytest.approx(10.0 + left * width)
 
 
-@pytest.mark.parametrize("layout", ["pilot", "engineer", "replay"])
-def test_layouts_name_only_entities_that_are_logged(layout: str) -> None:
-    views = list(_views(blueprint(layout).root_container))
+@pytest.mark.parametrize("replay", [False, True])
+@pytest.mark.parametrize("layout", ["pilot", "cockpit", "engineer", "compare"])
+def test_layouts_name_only_entities_that_are_logged(layout: Layout, replay: bool) -> None:
+    views = list(_views(blueprint(layout, replay=replay).root_container))
     origins = {str(view.origin).strip("/") for view in views}
-    known = {"world/chase", "instruments", "corridor", "map", "events", "events/log"} | {
+    known = {"world/chase", "world/aircraft", "instruments", "corridor", "map", "events", "events/log"} | {
         group.path for group in plot_groups()
     }
     known |= set(PILOT_PLOTS)
+    if layout == "compare":
+        known |= {f"{kind}/{name}" for kind in ("compare", "difference") for name in COMPARED} | {"difference/apart"}
     assert origins <= known
-    assert {"world/chase", "corridor", "map", "events", "events/log"} <= origins
+    assert {"world/chase", "world/aircraft", "corridor", "map", "events", "events/log"} <= origins
     if layout == "engineer":
         assert {group.path for group in plot_groups()} <= origins, "the engineer sees every signal"
 

@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 
 from rtsim.arrays import FloatArray
 from rtsim.frame import COLUMN, SIGNAL_COUNT
-from telemetry.view import airframe, gauges, ground_map, instruments, scene, undercarriage
+from telemetry.view import (
+    aircraft,
+    airframe,
+    gauges,
+    ground_map,
+    instruments,
+    scene,
+    surroundings,
+    turning,
+    undercarriage,
+)
 from telemetry.view.colours import GREEN, LEFT_ROTOR, RED, RIGHT_ROTOR, TRAIL, WHITE, WIND
 from telemetry.view.strokes import Colour, LineArt
 
@@ -45,7 +55,7 @@ def turned(quaternion: list[float], vector: FloatArray) -> FloatArray:
 
 
 def about(axis: FloatArray, angle_deg: float, vectors: FloatArray) -> FloatArray:
-    return np.array([turned(scene._about(axis, math.radians(angle_deg)), vector) for vector in vectors])
+    return np.array([turned(turning.about(axis, math.radians(angle_deg)), vector) for vector in vectors])
 
 
 class Recording:
@@ -69,7 +79,7 @@ def strips_of(art: LineArt, colour: Colour) -> list[FloatArray]:
 
 
 def test_a_right_bank_lowers_the_right_wing_of_the_drawn_aircraft() -> None:
-    attitude = scene.attitude_of(row_of(bank_deg=30.0))
+    attitude = aircraft.attitude_of(row_of(bank_deg=30.0))
     wing = np.array([turned(attitude, vertex) for vertex in airframe.wing().vertices])
     right, left = airframe.wing().vertices[:, 1] > 4.8, airframe.wing().vertices[:, 1] < -4.8
     # z points down: the right tip is lower by the span times the sine of the bank.
@@ -80,14 +90,14 @@ def test_a_right_bank_lowers_the_right_wing_of_the_drawn_aircraft() -> None:
     ("heading", "nose", "right"), [(0.0, NORTH, EAST), (90.0, EAST, -NORTH), (180.0, -NORTH, -EAST)]
 )
 def test_the_nose_points_where_the_heading_says(heading: float, nose: FloatArray, right: FloatArray) -> None:
-    attitude = scene.attitude_of(row_of(heading_deg=heading))
+    attitude = aircraft.attitude_of(row_of(heading_deg=heading))
     assert turned(attitude, NORTH) == pytest.approx(nose, abs=1e-12)
     assert turned(attitude, EAST) == pytest.approx(right, abs=1e-12)
 
 
 @given(st.floats(-80, 80), st.floats(-60, 60), st.floats(0, 360))
 def test_bank_pitch_and_heading_are_read_back_from_the_drawn_attitude(bank: float, pitch: float, head: float) -> None:
-    attitude = scene.attitude_of(row_of(bank_deg=bank, pitch_deg=pitch, heading_deg=head))
+    attitude = aircraft.attitude_of(row_of(bank_deg=bank, pitch_deg=pitch, heading_deg=head))
     nose, right, below = (turned(attitude, axis) for axis in (NORTH, EAST, DOWN))
     assert math.degrees(math.asin(-nose[2])) == pytest.approx(pitch, abs=1e-6)
     assert math.degrees(math.atan2(right[2], below[2])) == pytest.approx(bank, abs=1e-6)
@@ -95,11 +105,11 @@ def test_bank_pitch_and_heading_are_read_back_from_the_drawn_attitude(bank: floa
 
 
 def test_the_aircraft_is_where_north_east_and_altitude_say() -> None:
-    assert scene.place_of(row_of(north_m=3.0, east_m=-4.0, altitude_m=50.0, distance_m=99.0)) == [3.0, -4.0, -50.0]
+    assert aircraft.place_of(row_of(north_m=3.0, east_m=-4.0, altitude_m=50.0, distance_m=99.0)) == [3.0, -4.0, -50.0]
 
 
 def test_the_compass_rose_and_the_map_have_north_ahead_and_east_to_the_right() -> None:
-    strips = [np.array(strip) for strip in scene.compass_rose().strips.as_arrow_array().to_pylist()]
+    strips = [np.array(strip) for strip in surroundings.compass_rose().strips.as_arrow_array().to_pylist()]
     letters = strips[13:]  # after ring and twelve marks
     middle = [np.mean(np.concatenate([strip]), axis=0) for strip in letters]
     assert middle[0] @ NORTH > 1.1  # N first
@@ -115,7 +125,7 @@ def test_each_disc_tilts_by_its_own_flapping(side: float) -> None:
         longitudinal_flapping_deg=3.0, differential_longitudinal_flapping_deg=1.0, lateral_flapping_deg=2.0,
         differential_lateral_flapping_deg=-0.5,
     )  # fmt: skip
-    axis = turned(scene.hub_of(row, side), NORTH)
+    axis = turned(aircraft.hub_of(row, side), NORTH)
     assert math.degrees(math.asin(axis[2])) == pytest.approx(3.0 + side, abs=0.01), "forward in helicopter mode"
     # Positive sine flapping lifts the outboard edge: the disc leans inboard.
     assert math.degrees(math.asin(axis[1])) == pytest.approx(-side * (2.0 - 0.5 * side), abs=0.01)
@@ -125,7 +135,7 @@ def test_each_disc_tilts_by_its_own_flapping(side: float) -> None:
 def test_blades_advance_outboard_with_their_leading_edge_first(side: float) -> None:
     # In helicopter mode the mast (+x) is up and +z ahead; the outboard blade of the right rotor is at +y.
     outboard = side * EAST
-    moved = turned(scene._about_x(side * 0.01), outboard) - outboard
+    moved = turned(turning.about_x(side * 0.01), outboard) - outboard
     assert moved[2] > 0.0
     blade = airframe.blades(side).vertices
     blade = blade[blade @ np.array([0.0, 1.0, 0.0]) > 0.9 * airframe.ROTOR_RADIUS]  # one stands along +y
@@ -136,7 +146,7 @@ def test_blades_advance_outboard_with_their_leading_edge_first(side: float) -> N
 
 def test_control_surfaces_move_the_right_way() -> None:
     row = row_of(aileron_deg=10.0, rudder_deg=12.0, elevator_deg=8.0, flap_deg=40.0)
-    angles = scene.surface_angles(row)
+    angles = aircraft.surface_angles(row)
     assert angles["flaperon_right"] == pytest.approx(15.0), "droop 25 less 10: right one up"
     assert angles["flaperon_left"] == pytest.approx(35.0)
     assert angles["flap_left"] == angles["flap_right"] == 40.0
