@@ -32,7 +32,7 @@ class Expectation:
     of: Literal["law", "off", "difference"] = "law"
     """Whose value: the flight's, its unprotected twin's, or the first minus the second."""
     formula: str = ""
-    """A property in signal temporal logic; its robustness is what is measured, and ``metric`` is :data:`ROBUSTNESS`."""
+    """A property in signal temporal logic; its robustness is what is measured, and ``metric`` says so."""
 
     @property
     def limit(self) -> float | list[float]:
@@ -78,8 +78,10 @@ def clause_of(
     if formula is None:
         assert metric is not None  # the table was checked
         return Expectation(name, metric, low, high, **whose)
-    low = 0.0 if low is None and high is None else low
-    return Expectation(name, ROBUSTNESS, low, high, formula=formula, **whose)
+    from rtsim.properties.formula import parse_property  # loads its reader
+
+    low, unit = 0.0 if low is None and high is None else low, parse_property(formula).unit
+    return Expectation(name, f"{ROBUSTNESS} [{unit}]" if unit else ROBUSTNESS, low, high, formula=formula, **whose)
 
 
 def clause_problems(

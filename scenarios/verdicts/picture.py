@@ -13,6 +13,8 @@ from rtsim.arrays import FloatArray
 from rtsim.drawing import drawing
 from rtsim.frame import COLUMN
 from rtsim.loop.aircraft import database_of
+from rtsim.properties.formula import Flown, Property, parse_property
+from rtsim.properties.words import SIGNAL_UNITS, TWIN
 from rtsim.protection.boundary import load_boundary
 from rtsim.protection.limiter_kernels import torque_limit
 from rtsim.protection.limits import LIMIT_KINDS, load_limits
@@ -22,6 +24,8 @@ from scenarios.verdicts.tester import Case
 
 DRAWN_POINTS = 1500
 """Points of a line in a picture."""
+MOST_PROPERTIES = 3
+"""Properties that are drawn."""
 OUTSIDE_KT = -0.5
 """Margin below which a path is drawn as outside [kn]."""
 _LAW, _OFF, _OUTSIDE, _INSIDE, _WARNING = "#1f5fa8", "#8b96a3", "#c62828", "#eaf3ec", "#c77700"
@@ -90,7 +94,9 @@ def picture(case: Case) -> str:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(11.5, 8.2), layout="constrained")
-        grid = figure.add_gridspec(5, 2, width_ratios=(1.0, 1.1), height_ratios=(1.5, 1.2, 0.9, 0.9, 0.7))
+        asked = _properties(case)
+        heights = (1.5, 1.2, 0.9, 0.9, *(0.9 for _ in asked), 0.7)
+        grid = figure.add_gridspec(len(heights), 2, width_ratios=(1.0, 1.1), height_ratios=heights)
         flights = _flights(case)
         _draw_path(figure.add_subplot(grid[:, 0]), case, flights)
         margin = figure.add_subplot(grid[0, 1])
@@ -102,7 +108,9 @@ def picture(case: Case) -> str:
         height.set(ylabel="altitude [m]")
         height.set_ylim(*_at_least(height.get_ylim(), 10.0))
         _draw_changes(figure.add_subplot(grid[3, 1], sharex=margin), _thinned(case.flight.rows))
-        _draw_lanes(figure.add_subplot(grid[4, 1], sharex=margin), interventions(case.flight.rows))
+        for place, one in enumerate(asked):
+            _draw_robustness(figure.add_subplot(grid[4 + place, 1], sharex=margin), case, one)
+        _draw_lanes(figure.add_subplot(grid[-1, 1], sharex=margin), interventions(case.flight.rows))
         for axes in figure.axes[1:-1]:
             axes.tick_params(labelbottom=False)
         stream = io.BytesIO()
@@ -188,6 +196,28 @@ def _draw_shares(axes: Any, case: Case, flights: Sequence[tuple[str, FloatArray,
         ylabel="share of limit\n(dotted: off)" if len(flights) > 1 else "share of limit", ylim=(0.0, min(top, 2.5))
     )
     axes.legend(loc="best", fontsize="small", ncols=3)
+
+
+def _properties(case: Case) -> list[Property]:
+    """Properties that a case is judged by, those whose robustness changes over time."""
+    trial = case.scenario.trial
+    clauses = [*(trial.clauses if trial is not None else ()), *case.scenario.expectations]
+    read = [parse_property(formula) for formula in dict.fromkeys(clause.formula for clause in clauses) if formula]
+    drawn = [one for one in read if all(name.removeprefix(TWIN) in SIGNAL_UNITS for name in one.names)]
+    return [one for one in drawn if case.off is not None or not one.needs_twin][:MOST_PROPERTIES]
+
+
+def _draw_robustness(axes: Any, case: Case, one: Property) -> None:
+    dt, nothing = 1.0 / case.scenario.options.rate_hz, np.zeros(0)  # no metric is asked for
+    twin = None if case.off is None else Flown(case.off.rows, nothing)
+    values = one.over_time(Flown(case.flight.rows, nothing), dt, twin)
+    step = max(1, len(values) // DRAWN_POINTS)
+    time, shown = case.flight.rows[: len(values) : step, COLUMN.time_s], values[::step]
+    axes.plot(time, shown, color=_LAW, linewidth=1.2)
+    axes.fill_between(time, shown, 0.0, where=shown < 0.0, color=_OUTSIDE, alpha=0.4, linewidth=0.0)
+    axes.axhline(0.0, color=_OUTSIDE, linewidth=1.0)
+    axes.set(ylabel=f"robustness\n[{one.unit}]" if one.unit else "robustness")
+    axes.set_title(one.formula, fontsize=7, loc="left", pad=2)
 
 
 def _draw_changes(axes: Any, rows: FloatArray) -> None:

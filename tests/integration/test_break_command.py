@@ -115,7 +115,7 @@ def test_the_governor_is_broken_and_the_flight_is_a_scenario(governor, tmp_path)
     assert [file.suffix for file in files] == [".toml", ".svg"]
     case = tester.Tester(law="governor").run(scenarios.load_scenario(files[0]))
     assert case.flight.history_sha256 == example.history_sha256
-    assert [finding.metric for finding in case.failures if finding.metric == "robustness"]
+    assert [finding.metric for finding in case.failures if finding.metric == "robustness [kn]"]
     flight = scenarios.fly(files[0], speed="max")
     assert flight.history_sha256 == example.history_sha256
     content = tomllib.loads(example.text)
@@ -172,7 +172,7 @@ def test_a_planted_hole_is_found_and_its_cause_shows(planted):
     nacelle, margin = (flight.rows[:, _column(name)] for name in ("nacelle_deg", "margin_low_kt"))
     assert ((nacelle > 60.0) & (nacelle < 64.0) & (margin < 6.0)).any()
     mended = tester.Tester(law="full").run(_scenario(example, planted))
-    assert all(finding.held for finding in mended.findings if finding.metric == "robustness")
+    assert all(finding.held for finding in mended.findings if finding.metric == "robustness [kn]")
     assert len(tomllib.loads(example.text).get("pulses", [])) <= 1
 
 
