@@ -166,7 +166,7 @@ def test_a_cluster_finds_the_same(governor):
 
 
 def test_a_planted_hole_is_found_and_its_cause_shows(planted):
-    found = broken(law="planted_law:Hole", budget=120)
+    found = broken(law="planted_law:Hole", budget=120, classes=("early",))
     [example] = found.counterexamples
     flight = tester.Tester(law="planted_law:Hole").run(_scenario(example, planted)).flight
     nacelle, margin = (flight.rows[:, _column(name)] for name in ("nacelle_deg", "margin_low_kt"))
