@@ -38,7 +38,8 @@ def command_table() -> str:
     lines = ["| option | meaning | default |", "|---|---|---|"]
     for item in declared().values():
         name = item.flag.removeprefix("--")
-        value = "" if item.kind is bool else f" {'|'.join(item.choices)}" if item.choices else f" {_placeholder(item)}"
+        choices = f"{','.join(item.choices[:2])},..." if item.is_list else "|".join(item.choices)
+        value = "" if item.kind is bool else f" {choices or _placeholder(item)}"
         flag = f"`--{name}`, `--no-{name}`" if item.kind is bool else f"`--{name}{value}`"
         lines.append(_row(flag, _meaning(item), item.default_text))
     return "\n".join(lines)

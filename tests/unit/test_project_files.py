@@ -25,6 +25,14 @@ def test_links_lead_somewhere(page):
     assert [target for target in local if not (page.parent / target).exists()] == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_tables_fit_the_page(page):
+    """A cell of more than 300 signs is text, not a table; a word of more than 60 makes its column too wide."""
+    rows = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("|")]
+    cells = [re.sub(r"\]\([^)]*\)", "]", cell) for row in rows for cell in re.split(r"(?<!\\)\|", row)]
+    assert [cell for cell in cells if len(cell) > 300 or max(map(len, cell.split()), default=0) > 60] == []
+
+
 def test_ci_finds_the_test_command_of_the_readme():
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     extraction = re.search(r'command="\$\((sed .*?)\)"', script).group(1)
