@@ -112,7 +112,7 @@ def test_the_first_hour_of_the_documentation_passes(tmp_path):
     blocks = dict(reversed(re.findall(r"^   ```(python|toml)\n(.*?)^   ```", page, flags=re.DOTALL | re.MULTILINE)))
     (tmp_path / "mylaws.py").write_text(textwrap.dedent(blocks["python"]), encoding="utf-8")
     (tmp_path / "mine.toml").write_text(textwrap.dedent(blocks["toml"]), encoding="utf-8")
-    command = re.search(r"`rtsim test (mine.toml .*?)`", page).group(1).split()
+    command = re.search(r"rtsim test (mine\.toml [^`#\n]*)", page).group(1).split()
     ended = run(tmp_path, *command)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     assert ET.parse(tmp_path / "results.xml").getroot().attrib["failures"] == "0"
