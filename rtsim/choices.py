@@ -22,6 +22,8 @@ AidName = Literal["rate_damping", "attitude_retention", "altitude_hold", "airspe
 """What acts between the pilot's hands and the control mixing."""
 SwitchName = Literal[AidName, "automatic_flaps", "governor", "automatic_rotor_speed"]
 """All that can be switched in flight: the aids, and what moves flaps and rotors whoever flies."""
+FalsificationMethod = Literal["mixed", "situations", "cma-es", "surrogate", "random"]
+"""How a flight that breaks a law is looked for; ``mixed`` takes the others in turns, after random flights."""
 
 OUTER_LOOPS: tuple[OuterLoop, ...] = get_args(OuterLoop)
 CHART_NAMES: tuple[ChartName, ...] = get_args(ChartName)

@@ -7,6 +7,7 @@ Each is the law ``full`` but where it does nothing. What is broken is known, so 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 from rtsim.command import Command, Intervention, Margins, Sensors
 from rtsim.protection.laws import BuiltInLaw
@@ -14,7 +15,7 @@ from rtsim.protection.laws import BuiltInLaw
 KNOT = 1852.0 / 3600.0
 
 
-class _Full:
+class _Full(ABC):
     """The law ``full`` with a hole."""
 
     def __init__(self) -> None:
@@ -36,8 +37,9 @@ class _Full:
         self._time += dt
         return (command, []) if self._asleep(sensors, margins) else answer
 
+    @abstractmethod
     def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        raise NotImplementedError
+        """Whether it does nothing."""
 
 
 class LowSpeed(_Full):

@@ -7,10 +7,11 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rtsim.choices import FalsificationMethod
 from rtsim.cli.cluster import DaskAddress, DaskTls, cluster_of
 from rtsim.cli.options import takes_options
 from rtsim.cli.output import console, emit_json, progress, results
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from scenarios.falsification.evaluation import Flyer
     from scenarios.falsification.run import BreakOptions, BreakResult, EstimateResult
     from scenarios.falsification.search import Progress
-
-Method = Literal["mixed", "situations", "cma-es", "surrogate", "random"]
 
 
 def register(app: typer.Typer) -> None:
@@ -56,7 +55,7 @@ def break_command(
         ),
     ] = None,
     budget: Annotated[int, typer.Option(help="Flights of the search.", min=1, max=10_000_000)] = 1000,
-    method: Annotated[Method, typer.Option(help="How to search.")] = "mixed",
+    method: Annotated[FalsificationMethod, typer.Option(help="How to search.")] = "mixed",
     only: Annotated[
         list[str] | None, typer.Option("--class", help="Class that is searched; repeat.", show_default="all")
     ] = None,
@@ -151,20 +150,22 @@ def _search(task: Task, flyer: Flyer, asked: BreakOptions, goes_on: str) -> Brea
 @contextmanager
 def _watched(budget: int, goes_on: str) -> Iterator[tuple[Callable[[str, Progress], None], Callable[[], None]]]:
     """Progress with the least robustness so far; on Ctrl-C before the first flights, how to go on."""
-    done = {"words": "", "flights": 0, "shrinking": 0}
+    current, shown, shrunk = "", 0, 0
     with progress("Searching", total=budget) as advance:
 
         def told(words: str, now: Progress) -> None:
-            before = done["flights"] if done["words"] == words else 0
-            if done["words"] not in {"", words}:
-                advance(-float(done["flights"]))  # type: ignore[arg-type]  # the bar begins anew
+            nonlocal current, shown
+            if words != current:
+                advance(-shown)  # the bar begins anew
+                current, shown = words, 0
             least = ", ".join(f"{value:+.3g}" for value in now.least)
-            done["words"], done["flights"] = words, now.flights
-            advance(now.flights - before, f"{words}: least robustness {least}")  # type: ignore[operator]
+            advance(now.flights - shown, f"{words}: least robustness {least}")
+            shown = now.flights
 
         def shrinking() -> None:
-            done["shrinking"] += 1  # type: ignore[operator]
-            advance(0.0, f"Shrinking: {done['shrinking']} flights")
+            nonlocal shrunk
+            shrunk += 1
+            advance(0.0, f"Shrinking: {shrunk} flights")
 
         try:
             yield told, shrinking

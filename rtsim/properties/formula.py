@@ -7,15 +7,16 @@ import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.errors import InputError
-from rtsim.properties.reader import identifiers, read
-from rtsim.properties.robustness import Evaluator, Trace, check_window
 from rtsim.properties.words import TWIN, check_names, unit_of, values_of
+
+if TYPE_CHECKING:
+    from rtsim.properties.robustness import Trace
 
 LATER_S = 4.0
 """Time after which a flight is what was made of it [s]."""
@@ -97,7 +98,7 @@ class Property:
             InputError: The formula speaks of a twin and there is none.
         """
         trace = self._trace(flight, dt, twin)
-        over_time = Evaluator().visit(self.tree, trace)
+        over_time = _evaluated(self.tree, trace)
         value, later = float(over_time[0]), float(over_time[min(round(LATER_S / dt), trace.frames - 1)])
         # What decides stands in the formula as it is, or behind a "not".
         for sign, (node, found) in itertools.product((1.0, -1.0), trace.predicates):
@@ -113,7 +114,7 @@ class Property:
             twin: The same flight without a law.
         """
         inner = self.tree.children[0] if type(self.tree).__name__ == "Always" else self.tree
-        return np.asarray(Evaluator().visit(inner, self._trace(flight, dt, twin)), dtype=np.float64)
+        return _evaluated(inner, self._trace(flight, dt, twin))
 
     def _trace(self, flight: Flown, dt: float, twin: Flown | None) -> Trace:
         if self.needs_twin and twin is None:
@@ -126,6 +127,8 @@ class Property:
                 assert twin is not None  # asked for above
                 source = twin
             signals[name] = values_of(name.removeprefix(TWIN), source.rows[:frames], source.metrics)
+        from rtsim.properties.robustness import Trace  # loads rtamt and antlr
+
         return Trace(signals, dt, frames)
 
 
@@ -140,6 +143,8 @@ def parse_property(formula: str) -> Property:
     Raises:
         InputError: It cannot be read, speaks of what is not there, or compares what has different units.
     """
+    from rtsim.properties.reader import identifiers, read  # loads rtamt and antlr
+
     key = "property"
     if len(formula) > LARGEST_FORMULA or formula.count("(") > LARGEST_FORMULA // 20:
         raise InputError("is too long", key=key, value=formula[:40] + "...", allowed=f"{LARGEST_FORMULA} characters")
@@ -151,7 +156,7 @@ def parse_property(formula: str) -> Property:
         raise InputError(f"cannot be read: {_told(str(error))}", key=key, value=formula, mend=_EXAMPLE) from None
     parts = list(_parts(tree))
     for node in parts:
-        check_window(node, formula)
+        _check_window(node, formula)
         _check_brackets(node, formula)
     comparisons = [node for node in parts if type(node).__name__ == "Predicate"]
     if not comparisons or not _is_logic(tree):
@@ -171,6 +176,18 @@ def _told(words: str) -> str:
     words = re.sub(r" expecting \{.*\}", "", words.replace("<EOF>", "end"))
     place = re.match(r"(\d+):(\d+): Syntax ERROR, (.*)", words)
     return f"{place[3]} (character {int(place[2]) + 1})" if place else words
+
+
+def _evaluated(node: Any, trace: Trace) -> FloatArray:
+    from rtsim.properties.robustness import Evaluator  # loads rtamt and antlr
+
+    return np.asarray(Evaluator().visit(node, trace), dtype=np.float64)
+
+
+def _check_window(node: Any, formula: str) -> None:
+    """Refuse a window that ends before it begins."""
+    if hasattr(node, "begin") and node.begin > node.end:
+        raise InputError("has a window that ends before it begins", key="property", value=formula, mend="swap them")
 
 
 def _check_brackets(node: Any, formula: str) -> None:

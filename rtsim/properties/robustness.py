@@ -19,7 +19,6 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from rtsim.arrays import FloatArray
-from rtsim.errors import InputError
 from rtsim.properties.reader import Comparison, StlAstVisitor
 
 NANOSECONDS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "": 10**9}
@@ -253,16 +252,3 @@ def _timed_until(left: FloatArray, right: FloatArray, window: tuple[int, int]) -
             found[: frames - ahead] = np.maximum(found[: frames - ahead], there)
         kept[: frames - ahead] = np.minimum(kept[: frames - ahead], left[ahead:])
     return found
-
-
-def check_window(node: Any, formula: str) -> None:
-    """Refuse a window that ends before it begins.
-
-    Args:
-        formula: The formula, for the sentence.
-
-    Raises:
-        InputError: The window is none.
-    """
-    if hasattr(node, "begin") and node.begin > node.end:
-        raise InputError("has a window that ends before it begins", key="property", value=formula, mend="swap them")

@@ -55,5 +55,5 @@ def values_of(name: str, rows: FloatArray, metrics: FloatArray) -> FloatArray:
         metrics: Metrics of the flight, places ``VALUE``.
     """
     if name in SIGNAL_UNITS:
-        return rows[:, COLUMN.asdict()[name]].astype(np.float64)
+        return rows[:, getattr(COLUMN, name)].astype(np.float64)
     return np.full(len(rows), TrialMetrics(metrics)[name])

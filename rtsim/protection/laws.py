@@ -12,7 +12,7 @@ import numpy as np
 
 from rtsim.aircraft.condition import AircraftName
 from rtsim.choices import CorridorName
-from rtsim.command import CHANNELS, LATERAL_CHANNELS, Command, Intervention, Margins, ProtectionLaw, Sensors
+from rtsim.command import CHANNELS, LATERAL_CHANNELS, SENSOR, Command, Intervention, Margins, ProtectionLaw, Sensors
 from rtsim.lpv.database import Database
 from rtsim.lpv.files.storage import load_database
 from rtsim.plugins import PluginKind, find_plugin, make_plugin
@@ -76,6 +76,9 @@ class BuiltInLaw:
         self._work = np.zeros(data.WORK_SIZE)
         self._applied = np.zeros(len(CHANNELS))
         law_kernels.law_start(self._tables, self._state)
+        # Compiled, or loaded, here: a law that is one of its parts would lose its first call to the time limit.
+        nothing = (np.zeros(SENSOR.size), np.zeros(len(CHANNELS)), np.zeros(len(CHANNELS)), np.zeros(data.WORK_SIZE))
+        law_kernels.protect(self._tables, self._state.copy(), 0, *nothing)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BuiltInLaw:
         """Copy what changes in flight and share what is read-only.

@@ -139,8 +139,7 @@ def _start(item: ClassTable, corridor: Corridor, aircraft: AircraftName, chance:
     for _ in range(max(chance.attempts, 1)):
         nacelle = float(np.clip(chance.number("start.nacelle_deg", table.nacelle_deg), 0.0, 90.0))
         angle = deg(nacelle)
-        low = float(corridor.low.at(angle))
-        high = corridor.downstop_speed if angle <= corridor.downstop_nacelle else float(corridor.high.at(angle))
+        low, high = float(corridor.low_speed(angle)), float(corridor.high_speed(angle))
         if table.airspeed_kt is not None:
             airspeed = kt(chance.number("start.airspeed_kt", table.airspeed_kt))
         else:
@@ -219,11 +218,10 @@ def _target(item: ClassTable, start: ProgrammePoint, corridor: Corridor, chance:
     if table.target_kt is not None:
         target = kt(chance.number("speed.target_kt", table.target_kt))
     elif table.beyond_high_kt is not None:
-        high = corridor.downstop_speed if angle <= corridor.downstop_nacelle else float(corridor.high.at(angle))
-        target = high + kt(chance.number("speed.beyond_high_kt", table.beyond_high_kt))
+        target = float(corridor.high_speed(angle)) + kt(chance.number("speed.beyond_high_kt", table.beyond_high_kt))
     else:
         assert table.beyond_low_kt is not None  # the file was checked
-        target = float(corridor.low.at(angle)) - kt(chance.number("speed.beyond_low_kt", table.beyond_low_kt))
+        target = float(corridor.low_speed(angle)) - kt(chance.number("speed.beyond_low_kt", table.beyond_low_kt))
     return float(np.clip(target, AIRSPEED_RANGE[0], AIRSPEED_RANGE[1]))
 
 

@@ -14,8 +14,6 @@ from rtsim.outside import understanding
 from scenarios.campaign.chunks import Chunk, ChunkResult
 from scenarios.campaign.kept_folder import KeptFolder
 
-IDENTITY_FILE = "campaign.json"
-
 
 class Store:
     """A folder of finished pieces; each file appears whole or not at all."""

@@ -13,7 +13,7 @@ from scenarios.falsification.evaluation import SITUATIONS, Answer, Query
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Flown:
+class Tried:
     """One point and what came of it."""
 
     query: Query
@@ -28,14 +28,16 @@ class Flown:
 class Archive:
     """What was flown, in order."""
 
-    flown: list[Flown] = field(default_factory=list)
+    flown: list[Tried] = field(default_factory=list)
     """Every point that had a flight."""
     without_start: int = 0
     """Points that had none."""
     visits: FloatArray = field(default_factory=lambda: np.zeros(SITUATIONS))
     """Flights that were in each situation near a side of the corridor, shape (SITUATIONS,)."""
-    elites: list[dict[int, Flown]] = field(default_factory=list)
+    elites: list[dict[int, Tried]] = field(default_factory=list)
     """By property and situation: the flight that is nearest to breaking."""
+    _worst: dict[int, Tried] = field(default_factory=dict)
+    _first_broken: dict[int, int] = field(default_factory=dict)
 
     def add(self, queries: Sequence[Query], answers: Sequence[Answer]) -> None:
         """Take what came of points.
@@ -48,10 +50,17 @@ class Archive:
             if not answer.flights:
                 self.without_start += 1
                 continue
-            flown = Flown(query, answer, len(self.flown))
+            flown = Tried(query, answer, len(self.flown))
             self.flown.append(flown)
             if not self.elites:
                 self.elites = [{} for _ in answer.robustness]
+            if answer.problem:  # what a law that was given up let happen says nothing of the law
+                continue
+            for place, value in enumerate(answer.robustness.tolist()):
+                if value < self.least(place):
+                    self._worst[place] = flown
+                if value < 0.0:
+                    self._first_broken.setdefault(place, len(self.flown))
             bits = np.unpackbits(np.frombuffer(answer.exercised, dtype=np.uint8))[:SITUATIONS]
             self.visits += bits
             for place, elites in enumerate(self.elites):
@@ -68,13 +77,13 @@ class Archive:
         """
         return np.array([one.answer.robustness[place] for one in self.flown], dtype=np.float64)
 
-    def worst(self, place: int) -> Flown:
+    def worst(self, place: int) -> Tried:
         """The flight with the least robustness; of equal ones the first.
 
         Args:
             place: Place of the property.
         """
-        return self.flown[int(np.argmin(self.robustness(place)))]
+        return self._worst[place]
 
     def least(self, place: int) -> float:
         """The least robustness so far; inf before the first flight.
@@ -82,7 +91,7 @@ class Archive:
         Args:
             place: Place of the property.
         """
-        return float(self.robustness(place).min()) if self.flown else math.inf
+        return float(self._worst[place].answer.robustness[place]) if place in self._worst else math.inf
 
     def first_broken(self, place: int) -> int | None:
         """Number, from 1, of the first flight that broke a property.
@@ -90,5 +99,4 @@ class Archive:
         Args:
             place: Place of the property.
         """
-        broken = np.flatnonzero(self.robustness(place) < 0.0)
-        return int(broken[0]) + 1 if broken.size else None
+        return self._first_broken.get(place)

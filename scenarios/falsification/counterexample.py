@@ -13,7 +13,7 @@ from rtsim.properties.formula import Robustness, parse_property
 from rtsim.whole_file import write_whole
 from scenarios.campaign.chunks import LawVariant, Task, flown_of, fly_law, task_spec, twin_of
 from scenarios.campaign.trial import Bench, TrialFlight
-from scenarios.falsification.archive import Flown
+from scenarios.falsification.archive import Tried
 from scenarios.falsification.scenario_tables import Tables, scenario_tables, scenario_text
 from scenarios.falsification.shrinking import Shrinker
 from scenarios.falsification.space import class_spaces
@@ -100,10 +100,20 @@ class Prover:
         Args:
             tables: Its tables.
         """
+        found = self.asked(tables)
+        return found is not None and found.broken
+
+    def asked(self, tables: Tables) -> Robustness | None:
+        """Robustness of a scenario; None where it cannot be flown, or the law fails by itself.
+
+        Args:
+            tables: Its tables.
+        """
         try:
-            return self.fly(_parsed(scenario_text(tables)))[1].broken
+            flight, found = self.fly(_parsed(scenario_text(tables)))
         except InputError:
-            return False
+            return None
+        return None if flight.law_problems else found
 
     def off_violates(self, scenario: Scenario) -> list[str]:
         """What the flight violates without a law.
@@ -115,7 +125,7 @@ class Prover:
 
 
 def counterexample(
-    task: Task, formula: str, found: Flown, *, name: str, on_flight: Callable[[], None] | None = None
+    task: Task, formula: str, found: Tried, *, name: str, on_flight: Callable[[], None] | None = None
 ) -> Counterexample | None:
     """Make the scenario of a flight that breaks a property.
 
@@ -135,9 +145,9 @@ def counterexample(
     item = spec.classes[found.query.class_number]
     prover = Prover(law, formula, task.folder)
     tables = scenario_tables(plan, name=name, title=f"{item.title or item.name}: breaks {law.name}", law=law.name)
-    if not prover.breaks(tables):
+    as_found = prover.asked(tables)
+    if as_found is None or not as_found.broken:
         return None
-    as_found = prover.fly(_parsed(scenario_text(tables)))[1]
     shrinker = Shrinker(tables, prover.breaks, on_flight=on_flight)
     tables = shrinker.shrink(as_found.time)
     scenario = _parsed(scenario_text(tables))

@@ -168,8 +168,7 @@ def _class(space: ClassSpace, archive: Archive, properties: int) -> ClassCoverag
 def _side(corridor: Corridor, nacelle_deg: float) -> tuple[float, float]:
     """Low and high side of the corridor at a nacelle angle [kn]."""
     angle = deg(nacelle_deg)
-    high = corridor.downstop_speed if angle <= corridor.downstop_nacelle else float(corridor.high.at(angle))
-    return to_kt(float(corridor.low.at(angle))), to_kt(high)
+    return to_kt(float(corridor.low_speed(angle))), to_kt(float(corridor.high_speed(angle)))
 
 
 def _inside(corridor: Corridor) -> BoolArray:

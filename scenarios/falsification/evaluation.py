@@ -59,10 +59,6 @@ class Answer:
     """Where the corridor's margin was least."""
     time_s: float
     """When the corridor's margin was least."""
-    margin_kt: float
-    """The least margin."""
-    high: bool
-    """Whether that was on the high-speed side."""
     cells: bytes
     """Cells of the corridor that were flown through, a bit for each."""
     exercised: bytes
@@ -121,7 +117,7 @@ def _fly(
         plan = space.plan(spec, query.vector, task.options)
     except NoStart:
         nothing = np.full(len(properties), np.inf)
-        return Answer(nothing, nothing, 0, 0.0, 0.0, 0.0, 0.0, False, b"", b"", "", time.process_time() - begin)
+        return Answer(nothing, nothing, 0, 0.0, 0.0, 0.0, b"", b"", "", time.process_time() - begin)
     twin = twin_of(bench, plan, properties)
     flight = fly_law(bench, plan, task.laws[0], folder=task.folder)
     dt = 1.0 / plan.setup.options.rate_hz
@@ -137,8 +133,6 @@ def _fly(
         nacelle_deg=float(row[COLUMN.nacelle_deg]),
         airspeed_kt=float(row[COLUMN.airspeed_kt]),
         time_s=float(row[COLUMN.time_s]),
-        margin_kt=float(row[COLUMN.margin_kt]),
-        high=bool(row[COLUMN.margin_high_kt] < row[COLUMN.margin_low_kt]),
         cells=cells_of(rows),
         exercised=exercised(rows, plan.duration),
         problem="; ".join(flight.law_problems),

@@ -24,7 +24,7 @@ import numpy as np
 
 from rtsim.arrays import FloatArray
 from rtsim.optimization.methods import CmaMethod
-from scenarios.falsification.archive import Archive, Flown
+from scenarios.falsification.archive import Archive, Tried
 from scenarios.falsification.evaluation import SITUATIONS, Answer, Query
 from scenarios.falsification.space import ClassSpace
 from scenarios.falsification.surrogate import SurrogateSearch
@@ -97,7 +97,7 @@ class SituationSearch:
         fresh = BATCH if not elites else round(FRESH_SHARE * BATCH)
         return [self._fresh.draw() for _ in range(fresh)] + [self._varied(elites) for _ in range(BATCH - fresh)]
 
-    def _varied(self, elites: dict[int, Flown]) -> Query:
+    def _varied(self, elites: dict[int, Tried]) -> Query:
         """A variation of the flight nearest to breaking in the situation that was visited and tried least."""
         rarity = self._archive.visits + self._tried
         situation = min(elites, key=lambda one: (rarity[one], elites[one].answer.guidance[self._target], one))

@@ -15,7 +15,7 @@ from rtsim.outside import understanding
 from scenarios.campaign.kept_folder import KeptFolder
 from scenarios.falsification.evaluation import Answer, Flyer, Query
 
-NUMBERS = ("nacelle_deg", "airspeed_kt", "time_s", "margin_kt", "high", "flights", "seconds")
+NUMBERS = ("nacelle_deg", "airspeed_kt", "time_s", "flights", "seconds")
 """Numbers of an answer, in the order in which they are kept."""
 
 
@@ -42,8 +42,6 @@ class Record(KeptFolder):
         self._where = folder / pieces
         self._flyer = flyer
         self._number = 0
-        self.reused = 0
-        """Generations that were flown before."""
 
     def __call__(self, queries: Sequence[Query]) -> list[Answer]:
         """Fly the next generation, or look up what came of it.
@@ -59,8 +57,6 @@ class Record(KeptFolder):
         if found is None:
             found = self._flyer(queries)
             self._keep(queries, found)
-        else:
-            self.reused += 1
         self._number += 1
         return found
 
@@ -105,7 +101,7 @@ def _bits(listed: list[bytes]) -> Any:
 
 def _answer(robustness: Any, guidance: Any, numbers: Any, cells: Any, exercised: Any, problem: str) -> Answer:
     named: dict[str, Any] = dict(zip(NUMBERS, numbers.tolist(), strict=True))
-    named |= {"high": bool(named["high"]), "flights": int(named["flights"]), "problem": problem}
+    named |= {"flights": int(named["flights"]), "problem": problem}
     if not named["flights"]:
         return Answer(robustness=robustness, guidance=guidance, cells=b"", exercised=b"", **named)
     bits = {"cells": cells.tobytes(), "exercised": exercised.tobytes()}

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rtsim.choices import FalsificationMethod
 from rtsim.errors import InputError, suggestion
 from rtsim.properties.formula import parse_property
 from rtsim.versions import versions
@@ -22,7 +23,7 @@ from scenarios.falsification.counterexample import Counterexample, counterexampl
 from scenarios.falsification.coverage import Coverage, coverage_of
 from scenarios.falsification.evaluation import Flyer, Query
 from scenarios.falsification.record import Record
-from scenarios.falsification.search import MethodName, Progress, SearchResult, run_search
+from scenarios.falsification.search import Progress, SearchResult, run_search
 from scenarios.falsification.space import ClassSpace, class_spaces
 from scenarios.falsification.subject import CORRIDOR_KEPT
 from scenarios.falsification.subset_simulation import Estimate, estimate
@@ -40,7 +41,7 @@ class BreakOptions:
     """Formulas; empty: the campaign's, else that the corridor is kept."""
     budget: int = 1000
     """Flights under test."""
-    method: MethodName = "mixed"
+    method: FalsificationMethod = "mixed"
     """How to look."""
     seed: int = 0
     """Root of every random stream."""
@@ -240,7 +241,7 @@ def run_break(
         What was found: the same for any flyer, and after any interruption.
     """
 
-    def searched(method: MethodName, words: str, pieces: str) -> SearchResult:
+    def searched(method: FalsificationMethod, words: str, pieces: str) -> SearchResult:
         who: Flyer = flyer
         if options.folder is not None:
             fresh = options.fresh and pieces == "generations"

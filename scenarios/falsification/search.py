@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import get_args
 
+from rtsim.choices import FalsificationMethod
 from rtsim.random_streams import STREAM_SEARCH, stream_generator
 from scenarios.campaign.chunks import Task, task_spec
-from scenarios.falsification.archive import Archive, Flown
+from scenarios.falsification.archive import Archive, Tried
 from scenarios.falsification.evaluation import Flyer
 from scenarios.falsification.methods import DescentSearch, Method, RandomSearch, SituationSearch
 from scenarios.falsification.space import ClassSpace, class_spaces
 
-MethodName = Literal["mixed", "situations", "cma-es", "surrogate", "random"]
-METHODS: tuple[MethodName, ...] = get_args(MethodName)
-"""Methods by name; ``mixed`` takes the others in turns."""
-TURNS: tuple[MethodName, ...] = ("situations", "cma-es", "situations", "surrogate")
+METHODS: tuple[FalsificationMethod, ...] = get_args(FalsificationMethod)
+TURNS: tuple[FalsificationMethod, ...] = ("situations", "cma-es", "situations", "surrogate")
 """Turns of ``mixed``, after the first generations."""
 FIRST_PER_CLASS = 4
 """Flights of every class that are drawn before anything is varied."""
@@ -49,7 +49,7 @@ class SearchResult:
     """CPU time of the flights [s]."""
     wall_s: float = 0.0
     """Wall time [s]."""
-    problems: list[tuple[Flown, str]] = field(default_factory=list)
+    problems: list[tuple[Tried, str]] = field(default_factory=list)
     """Flights in which the law failed by itself."""
 
 
@@ -58,7 +58,7 @@ def run_search(
     flyer: Flyer,
     *,
     budget: int,
-    method: MethodName = "mixed",
+    method: FalsificationMethod = "mixed",
     keep_on: bool = False,
     classes: Sequence[str] = (),
     on_progress: Callable[[Progress], None] | None = None,
@@ -118,27 +118,28 @@ def run_search(
 class _Plan:
     """Whose turn it is."""
 
-    def __init__(self, task: Task, method: MethodName, archive: Archive, spaces: Sequence[ClassSpace]) -> None:
+    def __init__(self, task: Task, method: FalsificationMethod, archive: Archive, spaces: Sequence[ClassSpace]) -> None:
         self._task, self._name, self._archive, self._spaces = task, method, archive, spaces
         random = stream_generator(task.seed, STREAM_SEARCH, 1)
         self._first = RandomSearch(spaces, random)
-        self._methods: dict[tuple[MethodName, int], Method] = {}
+        self._methods: dict[tuple[FalsificationMethod, int], Method] = {}
         self._first_flights = FIRST_PER_CLASS * len(spaces)
         self._begun = 0
 
     def method(self, number: int, targets: Sequence[int]) -> Method:
         """The method of a generation, for one of the properties that are not broken yet."""
-        if self._name == "random" or len(self._archive.flown) < self._first_flights:
+        known = math.isfinite(self._archive.least(targets[0]))
+        if self._name == "random" or not known or len(self._archive.flown) < self._first_flights:
             self._begun = number + 1
             return self._first
         turn = number - self._begun
-        name: MethodName = self._name if self._name != "mixed" else TURNS[(turn // len(targets)) % len(TURNS)]
+        name: FalsificationMethod = self._name if self._name != "mixed" else TURNS[(turn // len(targets)) % len(TURNS)]
         target = targets[turn % len(targets)]
         if (name, target) not in self._methods:
             self._methods[name, target] = self._made(name, target)
         return self._methods[name, target]
 
-    def _made(self, name: MethodName, target: int) -> Method:
+    def _made(self, name: FalsificationMethod, target: int) -> Method:
         branch = 2 + METHODS.index(name) + len(METHODS) * target
         random = stream_generator(self._task.seed, STREAM_SEARCH, branch)
         if name == "situations":

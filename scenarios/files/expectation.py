@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from rtsim.errors import InputError, suggestion
 
@@ -62,19 +62,24 @@ class Expectation:
         return low and (self.maximum is None or value <= self.maximum)
 
 
-def clause_of(
-    name: str, metric: str | None, formula: str | None, low: float | None, high: float | None, **whose: Any
-) -> Expectation:
-    """Make a clause of what a checked table says.
+class ClauseTable(Protocol):
+    """What a table says of a clause: a metric or a property, and its limits."""
+
+    metric: str | None
+    property: str | None
+    min: float | None
+    max: float | None
+
+
+def clause_of(name: str, table: ClauseTable, **whose: Any) -> Expectation:
+    """Make a clause of what a checked table says; a property without limits must not be broken.
 
     Args:
         name: What is expected, in words.
-        metric: The metric, or None.
-        formula: The property, or None; without limits it must not be broken.
-        low: Smallest value that holds.
-        high: Largest value that holds.
+        table: The clause.
         whose: ``of``, where it is not the flight's.
     """
+    metric, formula, low, high = table.metric, table.property, table.min, table.max
     if formula is None:
         assert metric is not None  # the table was checked
         return Expectation(name, metric, low, high, **whose)
@@ -85,28 +90,17 @@ def clause_of(
 
 
 def clause_problems(
-    metric: str | None,
-    formula: str | None,
-    low: float | None,
-    high: float | None,
-    *,
-    known: Collection[str],
-    noun: str,
-    twin: bool,
-    file: str,
-    key: str,
+    table: ClauseTable, *, known: Collection[str], noun: str, twin: bool, file: str, key: str
 ) -> list[InputError]:
     """Mistakes in what a clause measures and allows.
 
     Args:
-        metric: The metric, or None.
-        formula: The property, or None.
-        low: Smallest value that holds.
-        high: Largest value that holds.
+        table: The clause.
         known: Metrics that there are.
         noun: What they are called, with the article.
         twin: Whether the flight has an unprotected twin.
     """
+    metric, formula, low, high = table.metric, table.property, table.min, table.max
     if (metric is None) == (formula is None):
         return [InputError("needs either metric or property", file=file, key=key, mend="give one of them")]
     if formula is not None:

@@ -134,10 +134,7 @@ def _expectation_contradictions(content: ScenarioFile, file: str) -> list[InputE
 
         key = f"expect[{number}]"
         found += clause_problems(
-            clause.metric,
-            clause.property,
-            clause.min,
-            clause.max,
+            clause,
             known=METRIC_NAMES,
             noun="a metric",
             twin=False,
@@ -244,9 +241,7 @@ def _scenario(content: ScenarioFile, text: str, file: str) -> Scenario:
         events=tuple(
             ScenarioEvent(event.time_s, event.pilot) for event in sorted(content.events, key=lambda event: event.time_s)
         ),
-        expectations=tuple(
-            clause_of(clause.name, clause.metric, clause.property, clause.min, clause.max) for clause in content.expect
-        ),
+        expectations=tuple(clause_of(clause.name, clause) for clause in content.expect),
         source=text,
         file=file,
         automatic=automatic_settings(content.automatic),

@@ -102,10 +102,7 @@ def _test_problems(trial: TrialTable, *, has_events: bool, flight: Mapping[str, 
 
         key = f"trial.expect[{number}]"
         found += clause_problems(
-            clause.metric,
-            clause.property,
-            clause.min,
-            clause.max,
+            clause,
             known=TRIAL_METRICS,
             noun="a metric of trials",
             twin=True,
@@ -130,9 +127,7 @@ def trial_of(table: TrialTable | None, protection: str | None = None) -> Trial |
         off_leaves=tuple(table.off_leaves),
         off_depth_kt=table.off_depth_kt,
         no_harm_height=table.no_harm_height_m,
-        clauses=tuple(
-            clause_of(item.name, item.metric, item.property, item.min, item.max, of=item.of) for item in table.expect
-        ),
+        clauses=tuple(clause_of(item.name, item, of=item.of) for item in table.expect),
     )
 
 

@@ -183,7 +183,7 @@ def test_records_of_searches(tmp_path):
 def test_records_of_searches_for_broken_laws(tmp_path):
     dice, queries = random.Random(7), [Query(0, np.array([0.4, 0.5]))] * 3
     numbers = np.array([1.0])
-    one = Answer(numbers, numbers, 1, 0.0, 0.0, 0.0, 0.0, False, b"\1" * 62, b"\2" * 74, "", 0.1)
+    one = Answer(numbers, numbers, 1, 0.0, 0.0, 0.0, b"\1" * 62, b"\2" * 74, "", 0.1)
     flown = []
 
     def fly(asked):

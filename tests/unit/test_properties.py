@@ -7,6 +7,7 @@ real-valued signals" (2010); rtamt's own discrete-time monitor as an independent
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from rtsim.measures.metric_kernels import METRICS, VALUE
 from rtsim.measures.metrics import TRIAL_METRICS, TrialMetrics
 from rtsim.properties.formula import LARGEST_FORMULA, Flown, parse_property
 from rtsim.properties.reader import Patient, rtamt
+from rtsim.properties.words import TWIN, UNITS
 from scenarios.campaign.events import EVENTS
 
 DT = 0.1
@@ -214,10 +216,15 @@ def test_mistakes_are_told_in_a_sentence(formula, words, capfd):
 @settings(max_examples=100, deadline=None)
 @given(st.text(alphabet="abgtkn_()[]:<>=!&|+-*/.,;0123456789 'always", max_size=60))
 def test_any_text_is_read_or_refused(text):
+    found, told = None, "property."
     try:
-        parse_property(text)
-    except InputError:
-        return
+        found = parse_property(text)
+    except InputError as error:
+        told = str(error)
+    assert re.fullmatch(r"property[^\n]*[.?]", told)
+    if found is not None:
+        assert found.formula == text
+        assert all(name.removeprefix(TWIN) in UNITS for name in found.names)
 
 
 def test_names_are_those_of_the_declarations():
