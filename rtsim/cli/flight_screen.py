@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from rtsim.cli.flight_panel import STYLES, Alarms, Line, Pace, panel, who_flies
 from rtsim.cli.flight_text import say
 from rtsim.cli.output import console, progress
+from rtsim.frame import COLUMN
 from rtsim.terminal import in_foreground
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class FlightScreen:
         """
         self._row = row
         if self._advance is not None:
-            time_s = float(row[1])
+            time_s = float(row[COLUMN.time_s])
             self._advance(max(0.0, time_s - self._shown_s))
             self._shown_s = time_s
 
@@ -122,7 +123,7 @@ class FlightScreen:
         lines = panel(
             row,
             self._control,
-            pace=self._pace.of(now, float(row[1])),
+            pace=self._pace.of(now, float(row[COLUMN.time_s])),
             duration_s=self._scenario.duration,
             who=who_flies(row, external=self._external, protection=options.protection),
         )
