@@ -50,15 +50,15 @@ class LowSpeed(_Full):
 
 
 class Corner(_Full):
-    """A hole in one corner of the corridor: at the high-speed side, nacelles between 79 and 81 deg."""
+    """A hole in one corner of the corridor: at the high-speed side, nacelles between 78 and 80 deg."""
 
     def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        return 79.0 < math.degrees(sensors.nacelle_angle) < 81.0 and margins.high < 10.0 * KNOT
+        return 78.0 < math.degrees(sensors.nacelle_angle) < 80.0 and margins.high < 11.0 * KNOT
 
 
 class Late(_Full):
-    """Something that happens only late: after 30 s, nacelles between 20 and 22 deg, near the low-speed side."""
+    """Something that happens only late: after 30 s, nacelles between 52 and 53 deg, near the low-speed side."""
 
     def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        late = self._time > 30.0 and margins.low < 8.0 * KNOT
-        return late and 20.0 < math.degrees(sensors.nacelle_angle) < 22.0
+        late = self._time > 30.0 and margins.low < 9.0 * KNOT
+        return late and 52.0 < math.degrees(sensors.nacelle_angle) < 53.0

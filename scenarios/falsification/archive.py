@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -32,8 +33,11 @@ class Archive:
     """Every point that had a flight."""
     without_start: int = 0
     """Points that had none."""
-    visits: FloatArray = field(default_factory=lambda: np.zeros(SITUATIONS))
-    """Flights that were in each situation near a side of the corridor, shape (SITUATIONS,)."""
+    flights: Counter[int] = field(default_factory=Counter)
+    """Flights of each class."""
+    visits: Counter[int] = field(default_factory=Counter)
+    """Flights that were in each situation near a side of the corridor, those of each class by themselves: another class
+    comes there by another way (key: ``class_number * SITUATIONS + situation``)."""
     elites: list[dict[int, Tried]] = field(default_factory=list)
     """By property and situation: the flight that is nearest to breaking."""
     _worst: dict[int, Tried] = field(default_factory=dict)
@@ -62,9 +66,11 @@ class Archive:
                 if value < 0.0:
                     self._first_broken.setdefault(place, len(self.flown))
             bits = np.unpackbits(np.frombuffer(answer.exercised, dtype=np.uint8))[:SITUATIONS]
-            self.visits += bits
+            self.flights[query.class_number] += 1
+            situations = (query.class_number * SITUATIONS + np.flatnonzero(bits)).tolist()
+            self.visits.update(situations)
             for place, elites in enumerate(self.elites):
-                for situation in np.flatnonzero(bits).tolist():
+                for situation in situations:
                     known = elites.get(situation)
                     if known is None or answer.guidance[place] < known.answer.guidance[place]:
                         elites[situation] = flown

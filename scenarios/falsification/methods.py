@@ -17,6 +17,7 @@ Legend:
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -25,7 +26,7 @@ import numpy as np
 from rtsim.arrays import FloatArray
 from rtsim.optimization.methods import CmaMethod
 from scenarios.falsification.archive import Archive, Tried
-from scenarios.falsification.evaluation import SITUATIONS, Answer, Query
+from scenarios.falsification.evaluation import Answer, Query
 from scenarios.falsification.space import ClassSpace
 from scenarios.falsification.surrogate import SurrogateSearch
 
@@ -89,19 +90,26 @@ class SituationSearch:
         """Look at what is flown."""
         self._fresh = RandomSearch(spaces, random)
         self._archive, self._target, self._random = archive, target, random
-        self._tried = np.zeros(SITUATIONS)
+        self._tried: Counter[int] = Counter()
+        self._asked: Counter[int] = Counter()
 
     def ask(self) -> list[Query]:
         """See :class:`Method`."""
         elites = self._archive.elites[self._target] if self._archive.elites else {}
+        self._asked.clear()
         fresh = BATCH if not elites else round(FRESH_SHARE * BATCH)
         return [self._fresh.draw() for _ in range(fresh)] + [self._varied(elites) for _ in range(BATCH - fresh)]
 
     def _varied(self, elites: dict[int, Tried]) -> Query:
-        """A variation of the flight nearest to breaking in the situation that was visited and tried least."""
-        rarity = self._archive.visits + self._tried
-        situation = min(elites, key=lambda one: (rarity[one], elites[one].answer.guidance[self._target], one))
-        self._tried[situation] += 1.0
+        """A variation of the flight nearest to breaking in the rarest situation of the class that flew least."""
+        visits, tried = self._archive.visits, self._tried
+        flown = self._archive.flights + self._asked
+        classes = {one.query.class_number for one in elites.values()}
+        chosen = min(classes, key=lambda number: (flown[number], number))
+        own = [one for one, flight in elites.items() if flight.query.class_number == chosen]
+        situation = min(own, key=lambda one: (visits[one] + tried[one], elites[one].answer.guidance[self._target], one))
+        tried[situation] += 1
+        self._asked[chosen] += 1
         query = elites[situation].query
         vector = query.vector.copy()
         mates = [one.query.vector for one in elites.values() if one.query.class_number == query.class_number]
