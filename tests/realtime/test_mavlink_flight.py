@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import queue
@@ -268,30 +269,36 @@ class Console:
         while piece := self.process.stdout.read1(4096):
             self._pieces.put(piece.decode(errors="replace"))
 
-    def expect(self, pattern, timeout_s=15.0):
-        """Wait for a text; what came before it is forgotten."""
+    def expect(self, pattern, timeout_s=15.0, *, ask=""):
+        """Wait for a text; what came before it is forgotten. A question is asked again every second."""
         end = time.monotonic() + timeout_s
         while True:
             found = re.search(pattern, self.text)
             if found:
                 self.text = self.text[found.end() :]
                 return found
-            try:
-                self.text += self._pieces.get(timeout=max(0.01, end - time.monotonic()))
-            except queue.Empty:
+            if time.monotonic() > end:
                 pytest.fail(f"MAVProxy did not say {pattern!r} but: {self.text[-2000:]}")
+            if ask:
+                self.type(ask)
+            with contextlib.suppress(queue.Empty):
+                self.text += self._pieces.get(timeout=1.0)
 
     def type(self, line):
         self.process.stdin.write(f"{line}\n".encode())
         self.process.stdin.flush()
 
     def shown(self, message, *fields):
-        """Numbers of the newest message of a kind."""
-        self.type(f"status {message}")
+        """Numbers of the newest message of a kind; MAVProxy says nothing of one that it has not received yet."""
+        self.text = ""  # an answer to an earlier question is not the newest
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._pieces.get_nowait()
         return [
             float(number)
             for number in self.expect(
-                rf"{message} {{.*?" + ".*?".join(rf"\b{field} : (-?[\d.e-]+)" for field in fields)
+                rf"{message} {{.*?" + ".*?".join(rf"\b{field} : (-?[\d.e-]+)" for field in fields),
+                ask=f"status {message}",
             ).groups()
         ]
 
