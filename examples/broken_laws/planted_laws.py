@@ -1,22 +1,54 @@
 """Protection laws with a planted fault each, to see how ``rtsim break`` finds them.
 
-Each is the law ``full`` but where it does nothing. What is broken is known, so what is found can be judged: see
-``docs/breaking.md``.
+Each is the law ``full`` but where it sleeps. What is broken is known, so what is found can be judged: see
+``docs/breaking.md``. Where they sleep was chosen by how seldom random flights of the campaign ``misuse`` come there.
 """
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
 
 from rtsim.command import Command, Intervention, Margins, Sensors
 from rtsim.protection.laws import BuiltInLaw
+from rtsim.units import KNOT
 
-KNOT = 1852.0 / 3600.0
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Where and when a law sleeps."""
+
+    nacelle_deg: tuple[float, float] = (-math.inf, math.inf)
+    """Between these nacelle angles."""
+    low_kt: float = -math.inf
+    """Nearer than this to the low-speed side, or"""
+    high_kt: float = -math.inf
+    """nearer than this to the high-speed side."""
+    below_kt: float = math.inf
+    """Below this airspeed."""
+    after_s: float = 0.0
+    """After this time."""
+
+    def holds(self, time, airspeed_kt, nacelle_deg, low_kt, high_kt):  # type: ignore[no-untyped-def]
+        """Whether the law sleeps, at one time or at all of a flight's.
+
+        Args:
+            time: Time [s].
+            airspeed_kt: Airspeed [kn].
+            nacelle_deg: Nacelle angle [deg].
+            low_kt: Airspeed above the corridor's low-speed side [kn].
+            high_kt: Airspeed below its high-speed side [kn].
+        """
+        there = (nacelle_deg >= self.nacelle_deg[0]) & (nacelle_deg < self.nacelle_deg[1])
+        near = (low_kt < self.low_kt) | (high_kt < self.high_kt)
+        return there & near & (airspeed_kt < self.below_kt) & (time > self.after_s)
 
 
-class _Full(ABC):
+class _Full:
     """The law ``full`` with a hole."""
+
+    region: ClassVar[Region]
 
     def __init__(self) -> None:
         self._full = BuiltInLaw("full")
@@ -35,30 +67,42 @@ class _Full(ABC):
         """
         answer = self._full.step(sensors, command, margins, dt)
         self._time += dt
-        return (command, []) if self._asleep(sensors, margins) else answer
-
-    @abstractmethod
-    def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        """Whether it does nothing."""
+        nacelle, airspeed = math.degrees(sensors.nacelle_angle), sensors.airspeed / KNOT
+        sleeps = self.region.holds(self._time, airspeed, nacelle, margins.low / KNOT, margins.high / KNOT)
+        return (command, []) if sleeps else answer
 
 
 class LowSpeed(_Full):
-    """A wrong branch at low speed: below 22 kn, near the low-speed side."""
+    """A wrong branch at low speed."""
 
-    def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        return sensors.airspeed < 22.0 * KNOT and margins.low < 5.0 * KNOT
+    region = Region(below_kt=20.0, low_kt=4.0)
 
 
-class Corner(_Full):
-    """A hole in one corner of the corridor: at the high-speed side, nacelles between 78 and 80 deg."""
+class Hover(_Full):
+    """A wrong branch at the lowest speeds."""
 
-    def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        return 78.0 < math.degrees(sensors.nacelle_angle) < 80.0 and margins.high < 11.0 * KNOT
+    region = Region(nacelle_deg=(80.0, math.inf), low_kt=8.0)
+
+
+class HighCorner(_Full):
+    """A hole in one corner of the corridor."""
+
+    region = Region(nacelle_deg=(70.0, 80.0), high_kt=6.0)
+
+
+class LowCorner(_Full):
+    """A hole in another corner."""
+
+    region = Region(nacelle_deg=(10.0, 20.0), low_kt=4.0)
 
 
 class Late(_Full):
-    """Something that happens only late: after 30 s, nacelles between 52 and 53 deg, near the low-speed side."""
+    """Something that happens only late."""
 
-    def _asleep(self, sensors: Sensors, margins: Margins) -> bool:
-        late = self._time > 30.0 and margins.low < 9.0 * KNOT
-        return late and 52.0 < math.degrees(sensors.nacelle_angle) < 53.0
+    region = Region(nacelle_deg=(30.0, 40.0), low_kt=6.0, high_kt=6.0, after_s=30.0)
+
+
+class LateCorner(_Full):
+    """The same in another place, where fewer flights come."""
+
+    region = Region(nacelle_deg=(20.0, 30.0), low_kt=6.0, high_kt=6.0, after_s=30.0)

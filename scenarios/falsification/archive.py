@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rtsim.arrays import FloatArray
-from scenarios.falsification.evaluation import SITUATIONS, Answer, Query
+from scenarios.falsification.evaluation import SITUATIONS, Answer, Query, margins_of
+
+CLOSE_KT = 10.0
+"""A flight that came nearer in a situation is one to go down from [kn]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,13 +35,13 @@ class Archive:
     """Every point that had a flight."""
     without_start: int = 0
     """Points that had none."""
-    flights: Counter[int] = field(default_factory=Counter)
-    """Flights of each class."""
-    visits: Counter[int] = field(default_factory=Counter)
-    """Flights that were in each situation near a side of the corridor, those of each class by themselves: another class
-    comes there by another way (key: ``class_number * SITUATIONS + situation``)."""
+    nearest: dict[int, Tried] = field(default_factory=dict)
+    """By class and situation (``class_number * SITUATIONS + situation``), since another class comes there by another way:
+    the flight that came nearest to the corridor's side in it."""
+    margins: dict[int, float] = field(default_factory=dict)
+    """How near that was [kn]."""
     elites: list[dict[int, Tried]] = field(default_factory=list)
-    """By property and situation: the flight that is nearest to breaking."""
+    """By property, class and situation: the flight that came close there and is nearest to breaking the property."""
     _worst: dict[int, Tried] = field(default_factory=dict)
     _first_broken: dict[int, int] = field(default_factory=dict)
 
@@ -65,15 +67,22 @@ class Archive:
                     self._worst[place] = flown
                 if value < 0.0:
                     self._first_broken.setdefault(place, len(self.flown))
-            bits = np.unpackbits(np.frombuffer(answer.exercised, dtype=np.uint8))[:SITUATIONS]
-            self.flights[query.class_number] += 1
-            situations = (query.class_number * SITUATIONS + np.flatnonzero(bits)).tolist()
-            self.visits.update(situations)
+            self._place(flown)
+
+    def _place(self, flown: Tried) -> None:
+        """Compare a flight with the best of the situations it was in."""
+        margins = margins_of(flown.answer.nearest)
+        base = flown.query.class_number * SITUATIONS
+        for one in np.flatnonzero(margins < np.inf).tolist():
+            situation, margin = base + one, float(margins[one])
+            if margin < self.margins.get(situation, math.inf):
+                self.margins[situation], self.nearest[situation] = margin, flown
+            if margin > CLOSE_KT:
+                continue
             for place, elites in enumerate(self.elites):
-                for situation in situations:
-                    known = elites.get(situation)
-                    if known is None or answer.guidance[place] < known.answer.guidance[place]:
-                        elites[situation] = flown
+                known = elites.get(situation)
+                if known is None or flown.answer.guidance[place] < known.answer.guidance[place]:
+                    elites[situation] = flown
 
     def robustness(self, place: int) -> FloatArray:
         """Robustness of every flight in a property, in order, shape (flights,).

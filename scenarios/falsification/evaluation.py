@@ -21,14 +21,16 @@ from scenarios.falsification.space import ClassSpace, class_spaces
 
 NACELLE_STEP_DEG, AIRSPEED_STEP_KT = 5.0, 10.0
 """Size of a cell of the corridor in the account of what was flown."""
-NEAR_KT = (6.0, 10.0)
-"""Margins below which a law is near a side of the corridor [kn]."""
-NEAR_NACELLE_DEG = 2.5
+NEAR_KT = 20.0
+"""Margin below which a flight is near a side of the corridor [kn]."""
+NACELLES, NEAR_NACELLE_DEG = 37, 2.5
 """Nacelle angles that differ by more are another situation."""
 QUARTERS = 4
 """Parts of a flight, each another situation."""
-SITUATIONS = 2 * len(NEAR_KT) * QUARTERS * 37
-"""Side, nearness, part of the flight, nacelle angle."""
+SITUATIONS = 2 * QUARTERS * NACELLES
+"""Side, part of the flight, nacelle angle."""
+_DEEPEST_KT, _STEPS_PER_KT, _NOWHERE = -10.0, 8.0, 255
+"""Least margin that is told from a smaller one [kn], steps of the account, and its word for not near."""
 NACELLE_CELLS, AIRSPEED_CELLS = 19, 26
 """Cells from 0 to 90 deg, and from 0 to 260 kn."""
 
@@ -61,8 +63,8 @@ class Answer:
     """When the corridor's margin was least."""
     cells: bytes
     """Cells of the corridor that were flown through, a bit for each."""
-    exercised: bytes
-    """Situations near a side of the corridor that the law was in, a bit for each."""
+    nearest: bytes
+    """Least margin in every situation near a side of the corridor that the flight was in; see :func:`margins_of`."""
     problem: str
     """What the law did wrong by itself; empty where it ran."""
     seconds: float
@@ -134,7 +136,7 @@ def _fly(
         airspeed_kt=float(row[COLUMN.airspeed_kt]),
         time_s=float(row[COLUMN.time_s]),
         cells=cells_of(rows),
-        exercised=exercised(rows, plan.duration),
+        nearest=nearest_of(rows, plan.duration),
         problem="; ".join(flight.law_problems),
         seconds=time.process_time() - begin,
     )
@@ -153,19 +155,31 @@ def cells_of(rows: FloatArray) -> bytes:
     return np.packbits(seen).tobytes()
 
 
-def exercised(rows: FloatArray, duration: float) -> bytes:
-    """Situations near a side of the corridor that a flight was in, one bit each.
+def nearest_of(rows: FloatArray, duration: float) -> bytes:
+    """How near a flight came to each side of the corridor in every part of the flight and at every nacelle angle.
 
     Args:
         rows: Its history.
         duration: Length of the whole flight [s].
+
+    Returns:
+        A byte for each situation, small where it was near.
     """
-    margin = rows[:, COLUMN.margin_kt]
-    near = rows[margin < NEAR_KT[-1]]
-    nearness = np.searchsorted(NEAR_KT, near[:, COLUMN.margin_kt], side="right")
-    high = near[:, COLUMN.margin_high_kt] < near[:, COLUMN.margin_low_kt]
-    quarter = np.minimum(QUARTERS * near[:, COLUMN.time_s] / duration, QUARTERS - 1).astype(np.int64)
-    nacelle = np.clip(near[:, COLUMN.nacelle_deg] / NEAR_NACELLE_DEG, 0.0, 36.0).astype(np.int64)
-    seen = np.zeros((2, len(NEAR_KT), QUARTERS, 37), dtype=np.bool_)
-    seen[high.astype(np.int64), nearness, quarter, nacelle] = True
-    return np.packbits(seen).tobytes()
+    found = np.full((2, QUARTERS, NACELLES), _NOWHERE, dtype=np.uint8)
+    quarters = np.minimum(QUARTERS * rows[:, COLUMN.time_s] / duration, QUARTERS - 1).astype(np.int64)
+    nacelles = np.clip(rows[:, COLUMN.nacelle_deg] / NEAR_NACELLE_DEG, 0.0, NACELLES - 1).astype(np.int64)
+    for side, column in enumerate((COLUMN.margin_low_kt, COLUMN.margin_high_kt)):
+        near = rows[:, column] < NEAR_KT
+        steps = np.maximum(np.ceil((rows[near, column] - _DEEPEST_KT) * _STEPS_PER_KT), 0.0).astype(np.uint8)
+        np.minimum.at(found[side], (quarters[near], nacelles[near]), steps)
+    return found.tobytes()
+
+
+def margins_of(nearest: bytes) -> FloatArray:
+    """Least margin in every situation [kn], shape (SITUATIONS,); inf where the flight was not in it.
+
+    Args:
+        nearest: What :func:`nearest_of` found.
+    """
+    steps = np.frombuffer(nearest, dtype=np.uint8)
+    return np.where(steps == _NOWHERE, np.inf, _DEEPEST_KT + steps / _STEPS_PER_KT)

@@ -76,7 +76,7 @@ class Record(KeptFolder):
             if data["classes"].tolist() != classes or not np.array_equal(data["vectors"], vectors):
                 raise InputError("does not follow from this search's seed", file=file, mend=mend)
             problems = TypeAdapter(list[str]).validate_json(str(data["problems"].item()))
-            named = ("robustness", "guidance", "numbers", "cells", "exercised")
+            named = ("robustness", "guidance", "numbers", "cells", "nearest")
             return [_answer(*one) for one in zip(*(data[name] for name in named), problems, strict=True)]
 
     def _keep(self, queries: Sequence[Query], answers: Sequence[Answer]) -> None:
@@ -87,22 +87,22 @@ class Record(KeptFolder):
             robustness=[answer.robustness for answer in answers],
             guidance=[answer.guidance for answer in answers],
             numbers=[[float(getattr(answer, name)) for name in NUMBERS] for answer in answers],
-            cells=_bits([answer.cells for answer in answers]),
-            exercised=_bits([answer.exercised for answer in answers]),
+            cells=_bytes([answer.cells for answer in answers]),
+            nearest=_bytes([answer.nearest for answer in answers]),
             problems=json.dumps([answer.problem for answer in answers]),
         )
 
 
-def _bits(listed: list[bytes]) -> Any:
-    """Bits of answers as an array; those of a point without a flight are 0."""
+def _bytes(listed: list[bytes]) -> Any:
+    """Bytes of answers as an array; those of a point without a flight are 0."""
     width = max(len(one) for one in listed)
     return [np.frombuffer(one.ljust(width, b"\0"), dtype=np.uint8) for one in listed]
 
 
-def _answer(robustness: Any, guidance: Any, numbers: Any, cells: Any, exercised: Any, problem: str) -> Answer:
+def _answer(robustness: Any, guidance: Any, numbers: Any, cells: Any, nearest: Any, problem: str) -> Answer:
     named: dict[str, Any] = dict(zip(NUMBERS, numbers.tolist(), strict=True))
     named |= {"flights": int(named["flights"]), "problem": problem}
     if not named["flights"]:
-        return Answer(robustness=robustness, guidance=guidance, cells=b"", exercised=b"", **named)
-    bits = {"cells": cells.tobytes(), "exercised": exercised.tobytes()}
-    return Answer(robustness=robustness, guidance=guidance, **bits, **named)
+        return Answer(robustness=robustness, guidance=guidance, cells=b"", nearest=b"", **named)
+    found = {"cells": cells.tobytes(), "nearest": nearest.tobytes()}
+    return Answer(robustness=robustness, guidance=guidance, **found, **named)

@@ -12,12 +12,14 @@ from rtsim.choices import FalsificationMethod
 from rtsim.random_streams import STREAM_SEARCH, stream_generator
 from scenarios.campaign.chunks import Task, task_spec
 from scenarios.falsification.archive import Archive, Tried
+from scenarios.falsification.drawing import RandomSearch
 from scenarios.falsification.evaluation import Flyer
-from scenarios.falsification.methods import DescentSearch, Method, RandomSearch, SituationSearch
+from scenarios.falsification.methods import DescentSearch, Method
+from scenarios.falsification.situations import SituationSearch
 from scenarios.falsification.space import ClassSpace, class_spaces
 
 METHODS: tuple[FalsificationMethod, ...] = get_args(FalsificationMethod)
-TURNS: tuple[FalsificationMethod, ...] = ("situations", "cma-es", "situations", "surrogate")
+TURNS: tuple[FalsificationMethod, ...] = ("situations", "cma-es", "situations", "situations", "surrogate", "situations")
 """Turns of ``mixed``, after the first generations."""
 FIRST_PER_CLASS = 4
 """Flights of every class that are drawn before anything is varied."""
@@ -143,5 +145,5 @@ class _Plan:
         branch = 2 + METHODS.index(name) + len(METHODS) * target
         random = stream_generator(self._task.seed, STREAM_SEARCH, branch)
         if name == "situations":
-            return SituationSearch(self._spaces, self._archive, target, random)
+            return SituationSearch(self._spaces, self._archive, random)
         return DescentSearch(name, self._archive, target, int(random.integers(2**40)), self._spaces)
