@@ -20,6 +20,7 @@ from scenarios.campaign.chance import PointChance, RecordingChance, number_at
 from scenarios.campaign.draws import NoStart, draw_plan, plan_by
 from scenarios.campaign.spec import Choice, Normal, Uniform, draw, load_campaign, parse_campaign
 from scenarios.falsification.archive import Archive
+from scenarios.falsification.drawing import RandomSearch, reflected
 from scenarios.falsification.evaluation import (
     AIRSPEED_CELLS,
     NACELLE_CELLS,
@@ -27,12 +28,14 @@ from scenarios.falsification.evaluation import (
     Answer,
     Query,
     cells_of,
-    exercised,
+    margins_of,
+    nearest_of,
 )
-from scenarios.falsification.methods import DescentSearch, RandomSearch, SituationSearch, reflected
+from scenarios.falsification.methods import DescentSearch
 from scenarios.falsification.record import Record
 from scenarios.falsification.scenario_tables import scenario_tables, scenario_text
 from scenarios.falsification.shrinking import MOST_FLIGHTS, Shrinker
+from scenarios.falsification.situations import SituationSearch
 from scenarios.falsification.space import class_spaces
 from scenarios.falsification.subject import subject_of
 from scenarios.falsification.surrogate import SurrogateSearch
@@ -53,11 +56,11 @@ signals = [
 """
 
 
-def answer(value, bits=(), flights=1):
-    seen = np.zeros(SITUATIONS, dtype=np.bool_)
-    seen[list(bits)] = True
+def answer(value, near=(), flights=1, margin=5.0):
+    nearest = np.full(SITUATIONS, 255, dtype=np.uint8)
+    nearest[list(near)] = round((margin + 10.0) * 8.0)
     known = np.array([value])
-    return Answer(known, known, flights, 0.0, 0.0, 0.0, b"\1" * 62, np.packbits(seen).tobytes(), "", 0.1)
+    return Answer(known, known, flights, 0.0, 0.0, 0.0, b"\1" * 62, nearest.tobytes(), "", 0.1)
 
 
 # --- space ---
@@ -165,19 +168,35 @@ def test_cells_and_situations_of_a_flight():
     rows[:, COLUMN.margin_high_kt], rows[:, COLUMN.time_s] = [60.0, 50.0, 3.0], [0.0, 5.0, 9.9]
     cells = np.unpackbits(np.frombuffer(cells_of(rows), np.uint8))[: NACELLE_CELLS * AIRSPEED_CELLS]
     assert np.argwhere(cells.reshape(NACELLE_CELLS, AIRSPEED_CELLS)).tolist() == [[0, 19], [9, 10], [18, 0]]
-    seen = np.unpackbits(np.frombuffer(exercised(rows, 10.0), np.uint8))[:SITUATIONS].reshape(2, 2, 4, 37)
-    assert np.argwhere(seen).tolist() == [[0, 1, 2, 18], [1, 0, 3, 0]]
+    margins = margins_of(nearest_of(rows, 10.0)).reshape(2, 4, 37)
+    assert np.argwhere(margins < np.inf).tolist() == [[0, 2, 18], [1, 3, 0]]
+    assert (margins[0, 2, 18], margins[1, 3, 0]) == (8.0, 3.0)
+
+
+def test_the_account_of_margins_holds_what_lies_outside():
+    """Steps of an eighth of a knot, rounded up; nothing below -10 kn is told apart, nothing from 20 kn on is near."""
+    for margin, told in ((-50.0, -10.0), (-0.3, -0.25), (3.01, 3.125), (19.9, 20.0), (20.0, np.inf)):
+        rows = np.full((1, SIGNAL_COUNT), 50.0)
+        rows[:, COLUMN.margin_low_kt], rows[:, COLUMN.time_s] = margin, 0.0
+        assert margins_of(nearest_of(rows, 10.0)).min() == told
 
 
 def test_the_archive_keeps_the_worst_of_every_situation():
     archive = Archive()
     queries = [Query(0, np.array([share])) for share in (0.1, 0.2, 0.3, 0.4)]
-    archive.add(queries, [answer(4.0, (1, 2)), answer(2.0, (2,)), answer(np.inf, flights=0), answer(-1.0, (7,))])
+    answers = [answer(4.0, (1, 2)), answer(2.0, (2,), margin=9.0), answer(np.inf, flights=0), answer(-1.0, (7,))]
+    archive.add(queries, answers)
     assert (len(archive.flown), archive.without_start) == (3, 1)
     assert [archive.elites[0][place].query.vector[0] for place in (1, 2, 7)] == [0.1, 0.2, 0.4]
+    assert [archive.nearest[place].query.vector[0] for place in (1, 2, 7)] == [0.1, 0.1, 0.4]
     assert (archive.least(0), archive.first_broken(0)) == (-1.0, 3)
     assert archive.worst(0).query.vector[0] == 0.4
-    assert [archive.visits[one] for one in (1, 2, 7)] == [1, 2, 1]
+
+
+def test_classes_have_situations_of_their_own():
+    archive = Archive()
+    archive.add([Query(0, np.array([0.1])), Query(3, np.array([0.2]))], [answer(4.0, (1,)), answer(5.0, (1,))])
+    assert sorted(archive.nearest) == [1, 3 * SITUATIONS + 1]
 
 
 # --- methods ---
@@ -212,23 +231,45 @@ def test_descents_find_the_lowest_point(kind):
     assert chance.least(0) > found.least(0)
 
 
-def test_situations_are_gone_round():
-    """Situations are fortieths of a mean of eight numbers, whose deviation is four: rare ones are visited, too."""
+def test_descents_go_on_where_they_get_lower():
+    """One class is flat, the other a bowl: most generations go to the bowl, and some still to the flat one."""
+    space = class_spaces(load_campaign("misuse")[0])[0]
+    spaces = [dataclasses.replace(space, number=number, coordinates=(None,) * 6) for number in range(2)]
+    archive, generator = Archive(), np.random.default_rng(2)
+    first, method = RandomSearch(spaces, generator), DescentSearch("cma-es", archive, 0, 3, spaces)
+    asked = []
+    for number in range(40):
+        queries = (first if number == 0 else method).ask()
+        values = [1.0 if one.class_number == 0 else float(bowl(one.vector[None, :])[0]) for one in queries]
+        answers = [answer(value, (3,)) for value in values]
+        archive.add(queries, answers)
+        if number:
+            method.tell(answers)
+            asked.append(queries[0].class_number)
+    assert asked.count(1) > 20
+    assert asked.count(0) > 3
 
-    def visits(make):
+
+def test_situations_are_gone_round():
+    """Situations are fortieths of a mean of eight numbers; the margin is their scatter: flights come nearer in all."""
+
+    def reached(make):
         archive, space = Archive(), class_spaces(load_campaign("misuse")[0])[0]
-        spaces = [dataclasses.replace(space, coordinates=(None,) * 8)]
-        method = make(spaces, archive)
+        method = make([dataclasses.replace(space, coordinates=(None,) * 8)], archive)
         for _ in range(60):
             queries = method.ask()
-            archive.add(queries, [answer(1.0, (int(40 * query.vector.mean()),)) for query in queries])
-        return [archive.visits[one] for one in range(8, 32)]  # three deviations either way
+            archive.add(queries, [situated(query.vector) for query in queries])
+        return archive.margins
+
+    def situated(vector):
+        return answer(1.0, (min(int(40 * vector.mean()), 39),), margin=30.0 * float(np.std(vector)))
 
     generator = np.random.default_rng(4)
-    by_chance = visits(lambda spaces, _: RandomSearch(spaces, generator))
-    gone_round = visits(lambda spaces, archive: SituationSearch(spaces, archive, 0, generator))
-    assert min(by_chance) < 3
-    assert min(gone_round) > 10
+    by_chance = reached(lambda spaces, _: RandomSearch(spaces, generator))
+    gone_round = reached(lambda spaces, archive: SituationSearch(spaces, archive, generator))
+    both = set(by_chance) & set(gone_round)
+    assert len(both) > 20
+    assert np.mean([gone_round[one] for one in both]) < 0.7 * np.mean([by_chance[one] for one in both])
 
 
 def test_methods_are_functions_of_their_seed():
@@ -364,7 +405,7 @@ def test_a_record_flies_nothing_twice(tmp_path):
         for found, kept in zip(again(one), known, strict=True):
             assert found.robustness.tolist() == kept.robustness.tolist()
             assert (found.flights, found.problem) == (kept.flights, kept.problem)
-            assert not kept.flights or (found.cells, found.exercised) == (kept.cells, kept.exercised)
+            assert not kept.flights or (found.cells, found.nearest) == (kept.cells, kept.nearest)
     with pytest.raises(InputError, match="does not follow from this search's seed"):
         Record(tmp_path, IDENTITY, flights, pieces="generations")([Query(0, np.array([0.9, 0.9]))] * 3)
     with pytest.raises(InputError, match="another search"):
