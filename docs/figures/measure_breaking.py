@@ -1,42 +1,79 @@
 """Measures how many flights ``rtsim break`` needs for laws with planted faults, beside random flights.
 
-    python docs/figures/measure_breaking.py search LAW SEEDS [METHOD [BUDGET [CAMPAIGN]]]
-    python docs/figures/measure_breaking.py random SEEDS [BUDGET [CAMPAIGN]]
+    python docs/figures/measure_breaking.py LAW FIRST:END [METHOD [BUDGET [CAMPAIGN]]]
 
-LAW is a class of ``examples/broken_laws/planted_laws.py``, SEEDS is FIRST:LAST+1. Prints the flight that broke it, by
-seed. ``random`` does so for all laws at once: a law that sleeps flies like ``full`` until it sleeps, so only those
-random flights of ``full`` that come where a law sleeps are flown with it.
+LAW is a class of ``examples/broken_laws/planted_laws.py``, seeds are FIRST to END - 1. Prints the flight that broke
+it, by seed. A planted law flies like ``full`` until it gives up, so ``full`` is flown, which is compiled, and the law
+itself where that comes into its region.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from rtsim.frame import COLUMN
-from rtsim.random_streams import STREAM_SEARCH, stream_generator
-from rtsim.worker_pool import Workers
-from scenarios.campaign.chunks import LawVariant, fly_law
-from scenarios.campaign.draws import NoStart
-from scenarios.campaign.trial import Bench
-from scenarios.falsification.drawing import RandomSearch
-from scenarios.falsification.evaluation import fly_points
-from scenarios.falsification.flyers import LocalFlyer
+from rtsim.choices import FalsificationMethod
+from scenarios.falsification.evaluation import Answer, Query, fly_points
 from scenarios.falsification.run import BreakOptions, break_task
 from scenarios.falsification.search import run_search
-from scenarios.falsification.space import class_spaces
 from scenarios.falsification.subject import CORRIDOR_KEPT, subject_of
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "examples" / "broken_laws"))
-LAWS = ("LowSpeed", "Hover", "HighCorner", "LowCorner", "Late", "LateCorner")
-SEEN = (COLUMN.time_s, COLUMN.airspeed_kt, COLUMN.nacelle_deg, COLUMN.margin_low_kt, COLUMN.margin_high_kt)
+import planted_laws
+from planted_laws import Region
 
 
-def search(law: str, seeds: range, method: str = "mixed", budget: int = 2000, campaign: str = "misuse") -> None:
+def kept_away(region: Region) -> str:
+    """The formula that a flight never comes where a law gives up.
+
+    Args:
+        region: Where that is.
+    """
+    low, high = region.nacelle_deg
+    apart = [f"margin_low_kt > {region.low_kt:g}"] if math.isfinite(region.low_kt) else []
+    apart += [f"margin_high_kt > {region.high_kt:g}"] if math.isfinite(region.high_kt) else []
+    ways = [f"({' and '.join(apart)})"]
+    ways += [f"nacelle_deg < {low:g}"] if math.isfinite(low) else []
+    ways += [f"nacelle_deg >= {high:g}"] if math.isfinite(high) else []
+    ways += [f"airspeed_kt >= {region.below_kt:g}"] if math.isfinite(region.below_kt) else []
+    ways += [f"time_s <= {region.after_s:g}"] if region.after_s > 0.0 else []
+    return f"always ({' or '.join(ways)})"
+
+
+class Shortcut:
+    """Flies ``full``, and the planted law where that comes into its region."""
+
+    def __init__(self, campaign: str, law: str, seed: int) -> None:
+        """Prepare both."""
+        spec, text, file = subject_of(campaign)
+        region = kept_away(getattr(planted_laws, law).region)
+        options = BreakOptions(law="full", properties=(CORRIDOR_KEPT, region), seed=seed)
+        self._full = break_task(spec, text, options=options, file=file)
+        options = BreakOptions(law=f"planted_laws:{law}", properties=(CORRIDOR_KEPT,), seed=seed)
+        self.task = break_task(spec, text, options=options, file=file)
+
+    def __call__(self, queries: Sequence[Query]) -> list[Answer]:
+        """Fly points.
+
+        Args:
+            queries: The points.
+        """
+        answers = []
+        for query, known in zip(queries, fly_points(self._full, queries), strict=True):
+            if known.robustness[1] < 0.0:
+                answers += fly_points(self.task, [query])
+            else:
+                answers.append(replace(known, robustness=known.robustness[:1], guidance=known.guidance[:1]))
+        return answers
+
+
+def search(law: str, seeds: range, method: FalsificationMethod, budget: int, campaign: str) -> None:
     """Count the flights of a search.
 
     Args:
@@ -46,13 +83,12 @@ def search(law: str, seeds: range, method: str = "mixed", budget: int = 2000, ca
         budget: Flights at most.
         campaign: What is searched.
     """
-    spec, text, file = subject_of(campaign)
+    spec, _, _ = subject_of(campaign)
     needed = []
     for seed in seeds:
-        options = BreakOptions(law=f"planted_laws:{law}", properties=(CORRIDOR_KEPT,), seed=seed)
-        task = break_task(spec, text, options=options, file=file)
+        flyer = Shortcut(campaign, law, seed)
         begin = time.perf_counter()
-        found = run_search(task, LocalFlyer(task, Workers(1), 1), budget=budget, method=method)  # type: ignore[arg-type]
+        found = run_search(flyer.task, flyer, budget=budget, method=method)
         first = found.archive.first_broken(0)
         needed.append(first or budget)
         worst = found.archive.worst(0)
@@ -63,55 +99,7 @@ def search(law: str, seeds: range, method: str = "mixed", budget: int = 2000, ca
     print(f"{law} {method}: median {np.median(needed):.0f} of {len(needed)} seeds, largest {max(needed)}", flush=True)
 
 
-def random(seeds: range, budget: int = 2000, campaign: str = "misuse") -> None:
-    """Count the flights of a random search.
-
-    Args:
-        seeds: Seeds.
-        budget: Flights at most.
-        campaign: What is searched.
-    """
-    import planted_laws
-
-    spec, text, file = subject_of(campaign)
-    spaces, bench = class_spaces(spec), Bench()
-    needed: dict[str, list[int]] = {law: [] for law in LAWS}
-    for seed in seeds:
-        task = break_task(
-            spec, text, options=BreakOptions(law="full", properties=(CORRIDOR_KEPT,), seed=seed), file=file
-        )
-        draws = RandomSearch(spaces, stream_generator(seed, STREAM_SEARCH, 1))
-        first: dict[str, int] = {}
-        flights = 0
-        while flights < budget and len(first) < len(LAWS):
-            query = draws.draw()
-            try:
-                plan = spaces[query.class_number].plan(spec, query.vector, task.options)
-            except NoStart:
-                continue
-            flights += 1
-            columns = fly_law(bench, plan, LawVariant("full")).rows[:, SEEN].T.copy()
-            for law in LAWS:
-                if law not in first and getattr(planted_laws, law).region.holds(*columns).any():
-                    other = replace(task, laws=(LawVariant(f"planted_laws:{law}"),))
-                    if fly_points(other, [query])[0].robustness[0] < 0.0:
-                        first[law] = flights
-        for law in LAWS:
-            needed[law].append(first.get(law, budget))
-        print(f"random seed {seed}: {first}", flush=True)
-    for law in LAWS:
-        print(
-            f"{law} random: median {np.median(needed[law]):.0f} of {len(seeds)} seeds: {sorted(needed[law])}",
-            flush=True,
-        )
-
-
 if __name__ == "__main__":
-    what, *arguments = sys.argv[1:]
-    place = 0 if what == "random" else 1
-    numbers = range(*map(int, arguments[place].split(":")))
-    rest = [int(one) if one.isdigit() else one for one in arguments[place + 1 :]]
-    if what == "random":
-        random(numbers, *rest)  # type: ignore[arg-type]
-    else:
-        search(arguments[0], numbers, *rest)  # type: ignore[arg-type]
+    rest = sys.argv[1:]
+    law, seeds, method, budget, campaign = rest + ["", "", "mixed", "2000", "misuse"][len(rest) :]
+    search(law, range(*map(int, seeds.split(":"))), method, int(budget), campaign)  # type: ignore[arg-type]

@@ -1,7 +1,8 @@
 """Protection laws with a planted fault each, to see how ``rtsim break`` finds them.
 
-Each is the law ``full`` but where it sleeps. What is broken is known, so what is found can be judged: see
-``docs/breaking.md``. Where they sleep was chosen by how seldom random flights of the campaign ``misuse`` come there.
+Each is the law ``full`` until it comes into a region, where it gives up for good. What is broken is known, so what is
+found can be judged: see ``docs/breaking.md``. The regions were chosen by how seldom random flights of the campaign
+``misuse`` come there.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from rtsim.units import KNOT
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """Where and when a law sleeps."""
+    """Where and when a law gives up."""
 
     nacelle_deg: tuple[float, float] = (-math.inf, math.inf)
     """Between these nacelle angles."""
@@ -31,7 +32,7 @@ class Region:
     """After this time."""
 
     def holds(self, time, airspeed_kt, nacelle_deg, low_kt, high_kt):  # type: ignore[no-untyped-def]
-        """Whether the law sleeps, at one time or at all of a flight's.
+        """Whether the law gives up, at one time or at all of a flight's.
 
         Args:
             time: Time [s].
@@ -46,13 +47,13 @@ class Region:
 
 
 class _Full:
-    """The law ``full`` with a hole."""
+    """The law ``full`` that gives up."""
 
     region: ClassVar[Region]
 
     def __init__(self) -> None:
         self._full = BuiltInLaw("full")
-        self._time = 0.0
+        self._time, self._gone = 0.0, False
 
     def step(
         self, sensors: Sensors, command: Command, margins: Margins, dt: float
@@ -68,8 +69,8 @@ class _Full:
         answer = self._full.step(sensors, command, margins, dt)
         self._time += dt
         nacelle, airspeed = math.degrees(sensors.nacelle_angle), sensors.airspeed / KNOT
-        sleeps = self.region.holds(self._time, airspeed, nacelle, margins.low / KNOT, margins.high / KNOT)
-        return (command, []) if sleeps else answer
+        self._gone |= self.region.holds(self._time, airspeed, nacelle, margins.low / KNOT, margins.high / KNOT)
+        return (command, []) if self._gone else answer
 
 
 class LowSpeed(_Full):

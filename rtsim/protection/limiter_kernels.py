@@ -225,7 +225,10 @@ def _recover(
     stick = target[model.CELL.control] - (cell[g] * d0 + cell[g + 1] * d1 + cell[g + 2] * d2 + cell[g + 3] * d3)
     lever = target[model.CELL.control + 1] - (cell[g + 4] * d0 + cell[g + 5] * d1 + cell[g + 6] * d2 + cell[g + 7] * d3)
     state[LAW.stick] = clip(stick, -1.0, 1.0)
-    state[LAW.lever] = clip(lever, 0.0, 1.0)
+    # Nose down the regulator would close the lever, whose drag costs more speed than the pull-up has time to win back:
+    # neither a sink nor the low-speed side is left with less than the power of level flight.
+    least = target[model.CELL.control + 1] if state[LAW.recover_side] <= 0.0 else 0.0
+    state[LAW.lever] = clip(lever, clip(least, 0.0, 1.0), 1.0)
 
 
 @inner_kernel
