@@ -33,24 +33,37 @@ def plot_command(
     out: Annotated[
         Path | None, typer.Option(help="Directory for the pictures.", show_default="LOG's name with -plots")
     ] = None,
+    formulas: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--property",
+            help="Draw how the flight stands to this, in signal temporal logic; repeat for several.",
+            show_default="what its scenario asks",
+        ),
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Draw a recorded flight: corridor, time histories, controls, flapping, margins, timing; as SVG and PNG.
 
     Examples:
         rtsim plot turn.parquet  # pictures into turn-plots
+        rtsim plot turn.parquet --property "always (margin_kt > 3)"
     """
+    from rtsim.cli.logged_properties import stated_properties
     from telemetry.log.flight_plots import plot_flight
     from telemetry.log.reader import read_log
 
     folder = out or log.with_name(f"{log.stem}-plots")
     check_writable(folder, folder=True)
     flight = read_log(log)
+    stated = stated_properties(flight, formulas)
     with progress("Drawing", total=1.0) as advance:
-        files = plot_flight(flight, folder, on_progress=advance)
+        files = plot_flight(flight, folder, on_progress=advance, properties=[one.curve for one in stated])
     if json:
-        emit_json({"log": log, "files": files})
+        emit_json({"log": log, "files": files, "properties": [one.report for one in stated]})
         return
+    for one in stated:
+        results.print(f"{one.curve.formula}: {one.curve.verdict}", markup=False, soft_wrap=True)
     for file in files:
         results.print(str(file), markup=False, soft_wrap=True)
 

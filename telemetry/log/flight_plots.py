@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +50,20 @@ class _Panel:
     dashed: tuple[str, ...] = ()
     reason: str = ""
     """Signal that says why protection changes this; the panel is shaded while it does."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PropertyCurve:
+    """How a flight stands to what was asked of it, over time."""
+
+    formula: str
+    """What was asked."""
+    unit: str
+    """Unit of its robustness."""
+    robustness: FloatArray
+    """Robustness in every frame, shape (frames,); negative: broken."""
+    verdict: str
+    """The whole flight's robustness, in words."""
 
 
 _FLIGHT = (
@@ -99,12 +114,17 @@ _NOTICED = 0.05
 
 
 def plot_flight(
-    log: FlightLog, directory: str | os.PathLike[str], on_progress: Callable[[float, str], None] | None = None
+    log: FlightLog,
+    directory: str | os.PathLike[str],
+    on_progress: Callable[[float, str], None] | None = None,
+    *,
+    properties: Sequence[PropertyCurve] = (),
 ) -> list[Path]:
     """Draw a flight.
 
     Args:
         log: The flight; what it does not hold (boundaries, timing) is left out.
+        properties: What was asked of it; drawn where there is any.
         directory: Where the pictures go; it is made if needed, pictures of the same name are replaced.
         on_progress: Called with the share of the work that was done, and what comes next, in words.
 
@@ -124,6 +144,9 @@ def plot_flight(
         raise OutputError(f"{out}: cannot be made ({failure.strerror}); choose another directory.") from failure
     files: list[Path] = []
     pictures = _pictures(log)
+    if properties:
+        asked = functools.partial(_draw_properties, properties=properties)
+        pictures.append(("properties", asked, (9.0, 1.5 + 2.0 * len(properties))))
     whole, done = sum(_work(size) for _, _, size in pictures), 0.0
     for name, draw, size in pictures:
         if on_progress is not None:
@@ -376,6 +399,19 @@ def _draw_margins(log: FlightLog, figure: Figure) -> None:
     lower.set_yticks([0, 1, 2, 3], ["clear", "caution", "warning", "exceedance"])
     lower.set_ylim(-0.3, 3.3)
     lower.set_xlabel("time [s]")
+
+
+def _draw_properties(log: FlightLog, figure: Figure, properties: Sequence[PropertyCurve]) -> None:
+    """Robustness over time, one panel for each property; below 0 the flight breaks it."""
+    panels = figure.subplots(len(properties), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, one in zip(panels, properties, strict=True):
+        time, shown = _thin(log["time_s"][: len(one.robustness)]), _thin(one.robustness)
+        axes.plot(time, shown, color=_COLOURS[0], linewidth=1.4)
+        axes.fill_between(time, shown, 0.0, where=shown < 0.0, color=_HIGH, alpha=0.35, linewidth=0.0)
+        axes.axhline(0.0, color=_HIGH, linewidth=1.0)
+        axes.set_title(_shortened(f"{one.formula}   {one.verdict}", 120), loc="left", fontsize=8.5)
+        axes.set_ylabel(f"robustness [{one.unit}]" if one.unit else "robustness")
+    panels[-1].set_xlabel("time [s]")
 
 
 def _draw_all_signals(log: FlightLog, figure: Figure) -> None:

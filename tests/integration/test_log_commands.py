@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from rtsim.cli.main import run as run_command
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED
 from rtsim.frame import COLUMN, SIGNAL_COUNT, history_sha256
 from telemetry.log.format import FlightMetadata, LogEvent
+from telemetry.log.reader import read_log
 from telemetry.log.recorder import Recorder
 
 
@@ -84,6 +86,48 @@ def test_plot_draws_beside_the_log_or_elsewhere(log: Path, tmp_path: Path, capsy
     code, out, _ = run(capsys, "plot", str(log), "--out", str(tmp_path / "elsewhere"))
     assert code == 0
     assert str(tmp_path / "elsewhere" / "flight.png") in out
+
+
+ASKED = """
+[[expect]]
+property = "always (airspeed_kt < 90)"
+[[trial.expect]]
+property = "always (airspeed_kt < twin_airspeed_kt + 5)"
+"""
+
+
+def test_plot_says_how_a_flight_stands_to_properties(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Airspeed rises evenly to 100 kn in 119 frames: 80 kn are passed by 20 kn, in the last frame."""
+    code, out, _ = run(capsys, "plot", str(log), "--property", "always (airspeed_kt < 80)", "--json")
+    assert code == 0
+    stated = json.loads(out)
+    assert str(tmp_path / "flight-plots" / "properties.svg") in stated["files"]
+    (one,) = stated["properties"]
+    assert (one["robustness"], one["unit"], one["broken"]) == (pytest.approx(-20.0), "kn", True)
+    assert one["decided_at_s"] == pytest.approx(119 / 50.0)
+    code, out, _ = run(capsys, "plot", str(log), "--property", "always (airspeed_kt < 101)")
+    assert "always (airspeed_kt < 101): +1 kn" in out
+    # What the scenario asks is drawn, as far as a log can answer: the twin was not recorded.
+    kept = read_log(log)
+    monkeypatch.setattr(
+        "telemetry.log.reader.read_log", lambda _: replace(kept, metadata=replace(kept.metadata, scenario_toml=ASKED))
+    )
+    code, out, _ = run(capsys, "plot", str(log), "--json")
+    assert [one["robustness"] for one in json.loads(out)["properties"]] == [pytest.approx(-10.0)]
+
+
+def test_what_a_log_cannot_answer_is_one_sentence(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for formula, words in (
+        ("always (twin_margin_kt > 0)", "twin_margin_kt, which no log holds"),
+        ("flapping_over_s <= 0", "flapping_over_s, which no log holds"),
+        ("always (margin > 0)", "margin"),
+    ):
+        code, _, err = run(capsys, "plot", str(log), "--property", formula)
+        assert code == EXIT_BAD_INPUT
+        assert words in err
+        assert "Traceback" not in err
 
 
 @pytest.mark.parametrize("command", [("log", "info"), ("plot",)])
