@@ -31,6 +31,8 @@ from rtsim.units import GRAVITY
 
 _LOADS_FROM = 10.0
 """Airspeed from which a pitch rate is reckoned as load [m/s]."""
+_LEAST_SENSITIVITY = 1e3
+"""Mast torque that all of the lever is taken to give at least [N m]."""
 
 
 @inner_kernel
@@ -226,8 +228,11 @@ def _recover(
     lever = target[model.CELL.control + 1] - (cell[g + 4] * d0 + cell[g + 5] * d1 + cell[g + 6] * d2 + cell[g + 7] * d3)
     state[LAW.stick] = clip(stick, -1.0, 1.0)
     # Nose down the regulator would close the lever, whose drag costs more speed than the pull-up has time to win back:
-    # neither a sink nor the low-speed side is left with less than the power of level flight.
-    least = target[model.CELL.control + 1] if state[LAW.recover_side] <= 0.0 else 0.0
+    # a sink and the low-speed side are left with the power of level flight at least, the high-speed side without power,
+    # but not on windmilling rotors.
+    least = target[model.CELL.control + 1]
+    if state[LAW.recover_side] > 0.0:
+        least -= target[model.CELL.torque] / max(target[model.CELL.torque + 5], _LEAST_SENSITIVITY)
     state[LAW.lever] = clip(lever, clip(least, 0.0, 1.0), 1.0)
 
 
@@ -360,7 +365,7 @@ def limit_lever(
     """
     settings = tables.settings
     dt = settings.period
-    sensitivity = max(cell[model.CELL.torque + 5], 1e3)
+    sensitivity = max(cell[model.CELL.torque + 5], _LEAST_SENSITIVITY)
     moved = dt / settings.collective_lag * (state[LAW.acted_lever] - state[LAW.collective])
     own = sensitivity * moved / dt
     rate = (torque - state[LAW.last_torque]) / dt - own if state[LAW.started] != 0.0 else 0.0
