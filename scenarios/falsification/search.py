@@ -19,7 +19,7 @@ from scenarios.falsification.situations import SituationSearch
 from scenarios.falsification.space import ClassSpace, class_spaces
 
 METHODS: tuple[FalsificationMethod, ...] = get_args(FalsificationMethod)
-TURNS: tuple[FalsificationMethod, ...] = ("situations", "cma-es", "situations", "situations", "surrogate", "situations")
+TURNS: tuple[FalsificationMethod, ...] = (*("situations",) * 3, "cma-es", *("situations",) * 3, "surrogate")
 """Turns of ``mixed``, after the first generations."""
 FIRST_PER_CLASS = 4
 """Flights of every class that are drawn before anything is varied."""

@@ -21,12 +21,12 @@ from scipy.spatial.distance import cdist
 from rtsim.arrays import FloatArray
 from scenarios.falsification.archive import Archive
 from scenarios.falsification.drawing import BATCH, RandomSearch, reflected
-from scenarios.falsification.evaluation import NEAR_KT, SITUATIONS, Answer, Query, margins_of
+from scenarios.falsification.evaluation import SITUATIONS, Answer, Query, margins_of
 from scenarios.falsification.space import ClassSpace
 
-FRESH_SHARE = 0.25
+FRESH_SHARE = 0.125
 """Share of the points that vary nothing but are drawn anew."""
-POOL = 10
+POOL = 40
 """Variations weighed for each that is flown."""
 STEPS = (0.01, 0.05, 0.2)
 """Standard deviations of a variation, one of them for each."""
@@ -34,8 +34,10 @@ MOVED = 0.3
 """Share of the coordinates that are moved."""
 MATING = 0.3
 """Share of the variations that take coordinates from a second flight of their class."""
-CONTEST = 3
+CONTEST = 5
 """Situations of which the one with the least margin is varied."""
+COUNTS_KT = 12.0
+"""Margin below which coming nearer counts [kn]."""
 NEIGHBOURS = 5
 """Flights by which a variation is foretold."""
 BENEFIT_KT, BENEFIT_PER_DISTANCE_KT = 0.9, 6.0
@@ -102,7 +104,7 @@ class SituationSearch:
     def _best(self, pool: Sequence[Query], number: int) -> list[int]:
         """Places in the pool of those that together promise to come nearest, in all situations summed."""
         foretold = self._foretold(pool)
-        least = np.full(SITUATIONS, NEAR_KT)
+        least = np.full(SITUATIONS, COUNTS_KT)
         for situation, margin in self._archive.margins.items():
             least[situation % SITUATIONS] = min(least[situation % SITUATIONS], margin)
         taken: list[int] = []
@@ -119,7 +121,7 @@ class SituationSearch:
             if not flown.answer.problem:
                 known = self._known.setdefault(flown.query.class_number, _Known())
                 known.vectors.append(flown.query.vector)
-                known.margins.append(np.minimum(margins_of(flown.answer.nearest), NEAR_KT))
+                known.margins.append(np.minimum(margins_of(flown.answer.nearest), COUNTS_KT))
         self._read = len(self._archive.flown)
         foretold = np.empty((len(pool), SITUATIONS))
         for number in sorted({query.class_number for query in pool}):
