@@ -36,8 +36,8 @@ class Archive:
     without_start: int = 0
     """Points that had none."""
     nearest: dict[int, Tried] = field(default_factory=dict)
-    """By class and situation (``class_number * SITUATIONS + situation``), since another class comes there by another way:
-    the flight that came nearest to the corridor's side in it."""
+    """By class and situation (``class_number * SITUATIONS + situation``; another class comes there by another way): the
+    flight that came nearest to the corridor's side in it."""
     margins: dict[int, float] = field(default_factory=dict)
     """How near that was [kn]."""
     elites: list[dict[int, Tried]] = field(default_factory=list)
