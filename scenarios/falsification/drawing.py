@@ -1,4 +1,10 @@
-"""Points drawn as a campaign draws its flights, and what keeps a point that was moved inside the cube."""
+"""Points drawn as a campaign draws its flights, and what keeps a point that was moved inside the cube.
+
+Legend:
+    spaces: The classes.
+    random: Source of randomness.
+    answers: What came of the points asked for, in their order.
+"""
 
 from __future__ import annotations
 

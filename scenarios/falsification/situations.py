@@ -6,6 +6,10 @@ the help of a surrogate (Gaier, Asteroth and Mouret 2018). What breaks a law in 
 since every corner is pushed at, early and late, by every class that comes there.
 
 Legend:
+    spaces: The classes.
+    archive: Everything flown.
+    random: Source of randomness.
+    answers: What came of the points asked for, in their order.
     pool: Points that may be flown.
 """
 
