@@ -230,9 +230,12 @@ def read_arrays(path: str | Path, *, noun: str, largest: int, mend: str) -> dict
     file = regular_file(path, noun=noun, largest=largest, missing=mend)
     found: dict[str, Any] = {}
     with understanding(noun, file=file, mend=mend), zipfile.ZipFile(file) as archive:
-        if sum(entry.file_size for entry in archive.infolist()) > largest:
+        if sum(max(entry.file_size, entry.compress_size) for entry in archive.infolist()) > largest:
             raise _too_large(str(file), noun, largest)
         for entry in archive.infolist():
+            if entry.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+                # numpy writes no other; a damaged one has its reader prepare for gigabytes.
+                raise InputError(f"is damaged, or no {noun}", file=str(file), mend=mend)
             content = archive.read(entry)  # its check sum is verified before numpy sees it
             array = arrays.read_array(io.BytesIO(content), allow_pickle=False)
             found[entry.filename.removesuffix(".npy")] = array
