@@ -95,6 +95,13 @@ def refuses(read, *arguments) -> bool:
     return False
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _made():
+    """What is made once for an installation is no cost of a damaged file."""
+    for path in TEXTS:
+        file_problems(str(path))
+
+
 @pytest.fixture(autouse=True)
 def _bounded():
     tracemalloc.start()
