@@ -38,8 +38,9 @@ MOVED = 0.3
 """Share of the coordinates that are moved."""
 MATING = 0.3
 """Share of the variations that take coordinates from a second flight of their class."""
-CONTEST = 5
-"""Situations of which the one with the least margin is varied."""
+CONTESTS = (1, 5)
+"""Situations of which the one with the least margin is varied, one number for each: a law need not hold the same margin
+everywhere."""
 COUNTS_KT = 12.0
 """Margin below which coming nearer counts [kn]."""
 NEIGHBOURS = 5
@@ -90,7 +91,7 @@ class SituationSearch:
         """
         random, nearest, margins = self._random, self._archive.nearest, self._archive.margins
         met = []
-        for _ in range(CONTEST):
+        for _ in range(CONTESTS[int(random.integers(len(CONTESTS)))]):
             place = places[int(random.integers(len(places)))]
             if random.random() < 0.5:
                 met.append(min(place, key=lambda one: (margins[one], one)))
