@@ -12,7 +12,7 @@ import numpy as np
 from rtsim.errors import InputError
 from rtsim.frame import SIGNAL_NAMES
 from rtsim.properties.formula import Flown, Robustness, parse_property
-from rtsim.properties.words import SIGNAL_UNITS, TWIN
+from rtsim.properties.words import SIGNAL_UNITS
 from telemetry.log.flight_plots import PropertyCurve
 
 if TYPE_CHECKING:
@@ -53,13 +53,14 @@ def stated_properties(log: FlightLog, formulas: Sequence[str] | None) -> list[St
         InputError: A formula cannot be read, or asks for what no log holds.
     """
     if formulas is None:
-        asked = [formula for formula in _of_scenario(log.metadata.scenario_toml) if not _beyond_a_log(formula)]
+        asked = [one for one in _of_scenario(log.metadata.scenario_toml) if not _beyond_a_log(one, log)]
     else:
         asked = list(formulas)
         for formula in asked:
-            if beyond := _beyond_a_log(formula):
-                problem = f"asks for {', '.join(beyond)}, which no log holds: signals of the frame alone"
-                raise InputError(problem, key="--property", value=formula, mend="run rtsim signals")
+            if beyond := _beyond_a_log(formula, log):
+                problem = f"asks for {', '.join(beyond)}, which this log does not hold"
+                mend = "ask for signals that rtsim log info names"
+                raise InputError(problem, key="--property", value=formula, mend=mend)
     if not asked or len(log.rows) < 2:
         return []
     rows = np.column_stack(
@@ -76,9 +77,9 @@ def _stated(formula: str, flown: Flown, dt: float) -> StatedProperty:
     return StatedProperty(PropertyCurve(formula, read.unit, read.over_time(flown, dt), verdict), whole)
 
 
-def _beyond_a_log(formula: str) -> list[str]:
-    """What a formula asks for that only a trial knows: the twin, and metrics of the whole flight."""
-    return [name for name in parse_property(formula).names if name.startswith(TWIN) or name not in SIGNAL_UNITS]
+def _beyond_a_log(formula: str, log: FlightLog) -> list[str]:
+    """What a formula asks for that only a trial knows (the twin, metrics of the whole flight), or no older log."""
+    return [name for name in parse_property(formula).names if name not in log.names or name not in SIGNAL_UNITS]
 
 
 def _of_scenario(text: str) -> Iterable[str]:
@@ -87,6 +88,9 @@ def _of_scenario(text: str) -> Iterable[str]:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return []
-    trial = tables.get("trial")
-    listed = [*tables.get("expect", []), *(trial.get("expect", []) if isinstance(trial, dict) else [])]
-    return dict.fromkeys(one["property"] for one in listed if isinstance(one, dict) and "property" in one)
+    listed = []
+    for table in (tables, tables.get("trial")):
+        expected = table.get("expect") if isinstance(table, dict) else None
+        listed += expected if isinstance(expected, list) else []
+    formulas = [one.get("property") for one in listed if isinstance(one, dict)]
+    return dict.fromkeys(formula for formula in formulas if isinstance(formula, str))

@@ -42,9 +42,9 @@ class RandomSearch:
 
 
 def reflected(vector: FloatArray) -> FloatArray:
-    """Bring a point back into the unit cube by mirrors at its sides.
+    """Bring points back into the unit cube by mirrors at its sides.
 
     Args:
-        vector: The point.
+        vector: The point, or several.
     """
     return np.asarray(1.0 - np.abs(1.0 - np.mod(np.abs(vector), 2.0)), dtype=np.float64)

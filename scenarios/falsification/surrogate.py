@@ -14,6 +14,7 @@ from scipy.spatial.distance import cdist
 
 from rtsim.arrays import FloatArray
 from rtsim.random_streams import STREAM_SEARCH, stream_generator
+from scenarios.falsification.drawing import reflected
 
 POPULATION = 8
 """Points of a generation."""
@@ -57,7 +58,7 @@ class SurrogateSearch:
         moved = self._random.random((CANDIDATES, size)) < share
         moved[np.arange(CANDIDATES), self._random.integers(size, size=CANDIDATES)] = True
         steps = self._step * self._random.standard_normal((CANDIDATES, size)) * moved
-        candidates = 1.0 - np.abs(1.0 - np.mod(np.abs(self._centre + steps), 2.0))
+        candidates = reflected(self._centre + steps)
         near = np.argsort(cdist(self._points, self._centre[None, :])[:, 0], kind="stable")[:MOST_KNOWN]
         known, values = np.unique(self._points[near], axis=0, return_index=True)
         promised = self._promise(known, np.clip(self._values[near][values], None, np.median(self._values)), candidates)

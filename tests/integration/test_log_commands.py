@@ -120,8 +120,8 @@ def test_plot_says_how_a_flight_stands_to_properties(
 
 def test_what_a_log_cannot_answer_is_one_sentence(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for formula, words in (
-        ("always (twin_margin_kt > 0)", "twin_margin_kt, which no log holds"),
-        ("flapping_over_s <= 0", "flapping_over_s, which no log holds"),
+        ("always (twin_margin_kt > 0)", "twin_margin_kt, which this log does not hold"),
+        ("flapping_over_s <= 0", "flapping_over_s, which this log does not hold"),
         ("always (margin > 0)", "margin"),
     ):
         code, _, err = run(capsys, "plot", str(log), "--property", formula)
