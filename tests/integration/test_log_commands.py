@@ -10,6 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from rtsim.cli.logged_properties import stated_properties
 from rtsim.cli.main import run as run_command
 from rtsim.errors import EXIT_BAD_INPUT, EXIT_OUTPUT_FAILED
 from rtsim.frame import COLUMN, SIGNAL_COUNT, history_sha256
@@ -116,6 +117,12 @@ def test_plot_says_how_a_flight_stands_to_properties(
     )
     code, out, _ = run(capsys, "plot", str(log), "--json")
     assert [one["robustness"] for one in json.loads(out)["properties"]] == [pytest.approx(-10.0)]
+
+
+@pytest.mark.parametrize("text", ["expect = 3", "trial = 1", "[[expect]]\nproperty = 5", "[[expect]]", "= broken"])
+def test_a_scenario_that_asks_nonsense_is_asked_nothing(log: Path, text: str) -> None:
+    kept = read_log(log)
+    assert stated_properties(replace(kept, metadata=replace(kept.metadata, scenario_toml=text)), None) == []
 
 
 def test_what_a_log_cannot_answer_is_one_sentence(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
